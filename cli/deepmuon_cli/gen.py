@@ -1,0 +1,177 @@
+"""`deepmuon-gen`: muons from a model to an HDF5 file."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+import click
+
+from deepmuon_cli.ending import run
+from deepmuon_cli.numbers import muon_number, positive_number, seed_number
+
+if TYPE_CHECKING:  # the libraries are imported when they are needed: --help is answered at once
+    from deepmuon_runtime import Generator
+
+__all__ = ["gen", "main"]
+
+NAME = "deepmuon-gen"
+FILE = click.Path(path_type=Path)
+
+
+@click.command(name=NAME, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.option("--depth", type=float, metavar="METRES", help="Metres of water above the muons (see --list).")
+@click.option("--architecture", metavar="NAME", help="quantile or transformer; the better one if left out.")
+@click.option("--model", type=FILE, metavar="FILE", help="Your own ONNX model, instead of --depth.")
+@click.option("-n", "--number", type=muon_number, metavar="NUMBER", help="How many muons: 1e7, 10_000_000.")
+@click.option(
+    "--live-time",
+    type=positive_number,
+    metavar="SECONDS",
+    help="Instead of -n: the muons that cross --area in this time, a Poisson number at the model's rate.",
+)
+@click.option("--area", type=positive_number, metavar="M2", help="The horizontal area for --live-time.")
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="The HDF5 file to be written.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing file, once the new one is complete.")
+@click.option("--seed", type=seed_number, metavar="SEED", help="0 to 2^64 - 1; a new one if left out.")
+@click.option(
+    "--device",
+    default="auto",
+    metavar="NAME",
+    help="cpu, cuda, or auto (the default): cuda if it can be had.",
+)
+@click.option("--threads", type=int, help="Computing side by side; if left out, as many as may be used.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress bar and no closing line.")
+@click.option("--list", "list_only", is_flag=True, help="List the released models.")
+@click.version_option(package_name="deepmuon-runtime", prog_name=NAME, message="%(prog)s %(version)s")
+def gen(
+    depth: float | None,
+    architecture: str | None,
+    model: Path | None,
+    number: int | None,
+    live_time: float | None,
+    area: float | None,
+    output: Path | None,
+    overwrite: bool,
+    seed: int | None,
+    device: str,
+    threads: int | None,
+    quiet: bool,
+    list_only: bool,
+) -> None:
+    """Write cosmic-ray muons to an HDF5 file.
+
+    The muons cross a horizontal plane downwards, at sea level (--depth 0) or under water: kinetic energy in
+    GeV, direction of motion (u, v, w) with z up, and pdg_id, 13 for mu- and -13 for mu+.
+
+    Ten million muons ten metres under water:
+
+    \b
+        deepmuon-gen --depth 10 -n 1e7 -o muons.h5
+
+    The muons that cross 4 m2 at sea level in one hour, the same ones whenever it is run:
+
+    \b
+        deepmuon-gen --depth 0 --live-time 3600 --area 4 --seed 1 -o hour.h5
+
+    And in Python:
+
+    \b
+        import h5py
+        with h5py.File("muons.h5") as file:
+            energy = file["muons/kinetic_energy"][:]     # GeV
+            live_time = file["muons"].attrs["live_time_s_m2"]
+
+    A seed gives the same muons for any -n and --threads: a shorter run is the beginning of a longer one. The
+    output appears under its name only when it is complete. Exit codes: 0 done, 1 failed while running,
+    2 refused before anything was written, 130 stopped by Ctrl-C, 143 stopped by SIGTERM.
+    """  # noqa: D301 - click looks for the character \b
+    started = time.perf_counter()
+    if list_only:
+        _print_models()
+        return
+    _check_model_options(depth, architecture, model)
+    _check_number_options(number, live_time, area)
+    if output is None:
+        raise click.UsageError("where to? Give the name of a file: -o muons.h5")
+
+    from deepmuon_runtime import Generator, new_seed
+    from deepmuon_runtime.muon_file import check_output
+
+    check_output(output, overwrite)
+    generator = Generator.open(depth, architecture, file=model, device=device, threads=threads)
+    seed = new_seed() if seed is None else seed
+    attributes = {}
+    if live_time is not None and area is not None:
+        number = generator.number_in_live_time(live_time, area, seed)
+        attributes = {"live_time_s": live_time, "area_m2": area}
+    assert number is not None
+    with _progress(number, hidden=quiet) as progress:
+        generator.write(output, number, seed, overwrite=overwrite, progress=progress, attributes=attributes)
+    if not quiet:
+        click.echo(_closing_line(output, number, time.perf_counter() - started, generator, seed))
+
+
+def main() -> NoReturn:
+    """Run `deepmuon-gen`."""
+    run(gen, NAME)
+
+
+def _check_model_options(depth: float | None, architecture: str | None, model: Path | None) -> None:
+    if depth is None and model is None:
+        raise click.UsageError("which muons? Give --depth METRES (--list shows the depths there are), or --model FILE")
+    if model is not None and (depth is not None or architecture is not None):
+        raise click.UsageError("--model goes without --depth and --architecture: the file has its own")
+
+
+def _check_number_options(number: int | None, live_time: float | None, area: float | None) -> None:
+    if (live_time is None) != (area is None):
+        raise click.UsageError("--live-time and --area go together")
+    if number is None and live_time is None:
+        raise click.UsageError("how many muons? Give -n (as in -n 1e7), or --live-time and --area")
+    if number is not None and live_time is not None:
+        raise click.UsageError("-n goes without --live-time: the live time decides the number")
+
+
+def _print_models() -> None:
+    from deepmuon_runtime.released import default_architecture, list_models
+
+    default = default_architecture()
+    click.echo("architecture   depth/m   rate/(1/m2/s)   muons/draw   size/kB")
+    for model in list_models():
+        mark = "*" if model.architecture == default else " "
+        rate = "unknown" if model.rate_hz_per_m2 is None else f"{model.rate_hz_per_m2:.2f}"
+        click.echo(
+            f"{model.architecture + mark:12} {model.depth_m:9g} {rate:>15} {model.muons_per_draw:12} "
+            f"{model.size / 1e3:9.0f}"
+        )
+    click.echo("* the default")
+
+
+@contextmanager
+def _progress(number: int, hidden: bool) -> Iterator[Callable[[int], object] | None]:
+    """Show a bar on stderr, if that is a terminal."""
+    if hidden or not sys.stderr.isatty():
+        yield None
+        return
+    with click.progressbar(length=number, file=sys.stderr, update_min_steps=max(1, number // 200)) as bar:
+        yield bar.update
+
+
+def _closing_line(output: Path, number: int, seconds: float, generator: Generator, seed: int) -> str:
+    rate = generator.model.rate_hz_per_m2
+    facts = [
+        f"{number:,} muons in {seconds:.2f} s",
+        f"{number / seconds:,.0f} muons/s on {generator.device}",
+        "rate unknown" if rate is None else f"equivalent live time {number / rate:,.1f} s for 1 m2",
+        f"seed {seed}",
+    ]
+    return f"{output}: {', '.join(facts)}"
+
+
+if __name__ == "__main__":
+    main()

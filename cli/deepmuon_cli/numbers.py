@@ -1,0 +1,67 @@
+"""Numbers as users write them: types of click options."""
+
+from __future__ import annotations
+
+import math
+from decimal import Decimal, InvalidOperation
+
+import click
+
+__all__ = ["muon_number", "positive_number", "seed_number"]
+
+
+def muon_number(text: str) -> int:
+    """Read a number of muons, exact however it is written: 1000, 1e7, 10_000_000.
+
+    Raises
+    ------
+    click.BadParameter
+        If it is no number, not whole, below 1, or above 2^53.
+    """
+    from deepmuon_runtime.generator import LARGEST_NUMBER
+
+    try:
+        number = Decimal(text)
+    except InvalidOperation as error:
+        raise click.BadParameter(f"{text} is no number: write for instance 1e7 or 10_000_000") from error
+    if number.is_nan() or not 0 < number <= LARGEST_NUMBER:
+        raise click.BadParameter(f"{text} muons can't be made: the number is from 1 to 2^53")
+    if number != number.to_integral_value():
+        raise click.BadParameter(f"{text} is not a whole number")
+    return int(number)
+
+
+def seed_number(text: str) -> int:
+    """Read a seed.
+
+    Raises
+    ------
+    click.BadParameter
+        If it is not a whole number from 0 to 2^64 - 1.
+    """
+    from deepmuon_runtime.latent import LARGEST_SEED
+
+    try:
+        seed = int(text)
+    except ValueError as error:
+        raise click.BadParameter(f"{text} is not a whole number") from error
+    if not 0 <= seed <= LARGEST_SEED:
+        raise click.BadParameter(f"{text} is not from 0 to 2^64 - 1")
+    return seed
+
+
+def positive_number(text: str) -> float:
+    """Read a number above 0.
+
+    Raises
+    ------
+    click.BadParameter
+        If it is not a finite number above 0.
+    """
+    try:
+        number = float(text)
+    except ValueError as error:
+        raise click.BadParameter(f"{text} is no number") from error
+    if not 0 < number < math.inf:
+        raise click.BadParameter(f"{text} is not a finite number above 0")
+    return number

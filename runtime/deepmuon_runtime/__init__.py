@@ -1,0 +1,24 @@
+"""Samples cosmic-ray muons from small ONNX generators."""
+
+from deepmuon_runtime.errors import DeepMuonError, FailedError, RefusedError
+from deepmuon_runtime.generator import Generator
+from deepmuon_runtime.latent import new_seed
+from deepmuon_runtime.model import Model
+from deepmuon_runtime.muon_file import MuonWriter, read_attributes, read_muons, write_muons
+from deepmuon_runtime.muons import Muons
+from deepmuon_runtime.released import list_models
+
+__all__ = [
+    "DeepMuonError",
+    "FailedError",
+    "Generator",
+    "Model",
+    "MuonWriter",
+    "Muons",
+    "RefusedError",
+    "list_models",
+    "new_seed",
+    "read_attributes",
+    "read_muons",
+    "write_muons",
+]

@@ -1,0 +1,113 @@
+"""The processor on which a model runs."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from contextlib import redirect_stdout
+from importlib.metadata import PackageNotFoundError, distribution
+
+import onnxruntime
+
+from deepmuon_runtime.errors import RefusedError
+
+__all__ = ["DEVICES", "open_session"]
+
+DEVICES = ("auto", "cpu", "cuda")
+
+CPU_PROVIDER = "CPUExecutionProvider"
+CUDA_PROVIDER = "CUDAExecutionProvider"
+
+# TF32 keeps 10 bits of the mantissa: too few for muons that agree with the CPU's to float32 rounding.
+CUDA_OPTIONS = {"use_tf32": "0"}
+
+_REMOVE = "pip uninstall -y onnxruntime onnxruntime-gpu"
+_INSTALL_CPU = f"{_REMOVE} && pip install onnxruntime"
+_INSTALL_CUDA = f"{_REMOVE} && pip install 'onnxruntime-gpu[cuda,cudnn]'"
+
+
+def open_session(content: bytes, name: str, device: str) -> tuple[onnxruntime.InferenceSession, str]:
+    """Load a model on a device.
+
+    Parameters
+    ----------
+    content
+        An ONNX file.
+    name
+        What to call it in an error.
+    device
+        "cpu"; "cuda"; or "auto", which is CUDA where it can be had, else the CPU.
+
+    Returns
+    -------
+    The session, which may be run from several threads at once, and the device that it took, "cpu" or "cuda".
+
+    Raises
+    ------
+    RefusedError
+        If the content is no ONNX model that ONNX Runtime can run, or CUDA was asked for and can't be had.
+    """
+    if device not in DEVICES:
+        raise RefusedError(f"no device {device!r}: there are {', '.join(DEVICES)}")
+    _warn_of_two_runtimes()
+    has_cuda = CUDA_PROVIDER in onnxruntime.get_available_providers()
+    if device == "cuda" and not has_cuda:
+        raise RefusedError(
+            "cuda can't be had: the installed ONNX Runtime is built for the CPU alone; replace it: " + _INSTALL_CUDA
+        )
+    if device == "cpu" or not has_cuda:
+        return _load(content, name, CPU_PROVIDER), "cpu"
+    session = _load_on_cuda(content, name)
+    if session is not None:
+        return session, "cuda"
+    if device == "cuda":
+        raise RefusedError(
+            "cuda can't be had: ONNX Runtime could not start on a GPU; see that nvidia-smi lists one, "
+            "and that the CUDA and cuDNN libraries are there: " + _INSTALL_CUDA
+        )
+    return _load(content, name, CPU_PROVIDER), "cpu"
+
+
+def _load(content: bytes, name: str, provider: str) -> onnxruntime.InferenceSession:
+    options = onnxruntime.SessionOptions()
+    # One thread a run: several runs side by side are faster than one run on several threads.
+    options.intra_op_num_threads = 1
+    options.inter_op_num_threads = 1
+    options.log_severity_level = 4  # what matters is raised
+    settings = [(provider, CUDA_OPTIONS if provider == CUDA_PROVIDER else {})]
+    try:
+        return onnxruntime.InferenceSession(content, options, providers=settings, enable_fallback=0)
+    except Exception as error:  # ONNX Runtime's own classes have no common base
+        reason = str(error).strip().splitlines()[0]
+        raise RefusedError(f"{name} is no ONNX model that can be run: {reason}") from error
+
+
+def _load_on_cuda(content: bytes, name: str) -> onnxruntime.InferenceSession | None:
+    """Return a session on the GPU, or None: ONNX Runtime falls back to the CPU, or raises."""
+    onnxruntime.set_default_logger_severity(4)
+    if hasattr(onnxruntime, "preload_dlls"):  # since 1.21: finds the libraries that pip installed
+        with redirect_stdout(io.StringIO()):
+            onnxruntime.preload_dlls(directory="")
+    try:
+        session = _load(content, name, CUDA_PROVIDER)
+    except RefusedError:
+        return None
+    return session if CUDA_PROVIDER in session.get_providers() else None
+
+
+def _warn_of_two_runtimes() -> None:
+    """Warn where both builds of ONNX Runtime are installed: each overwrites files of the other."""
+    if _is_installed("onnxruntime") and _is_installed("onnxruntime-gpu"):
+        warnings.warn(
+            "onnxruntime and onnxruntime-gpu are both installed and cannot work side by side; "
+            f"for the CPU: {_INSTALL_CPU}; for CUDA: {_INSTALL_CUDA}",
+            stacklevel=2,
+        )
+
+
+def _is_installed(name: str) -> bool:
+    try:
+        distribution(name)
+    except PackageNotFoundError:
+        return False
+    return True

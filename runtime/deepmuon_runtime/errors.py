@@ -1,0 +1,17 @@
+"""The two ways in which a request for muons can end without muons."""
+
+from __future__ import annotations
+
+__all__ = ["DeepMuonError", "FailedError", "RefusedError"]
+
+
+class DeepMuonError(Exception):
+    """Base of the errors that DeepMuon raises on purpose; its text is one line meant for the user."""
+
+
+class RefusedError(DeepMuonError):
+    """Refused before anything started: bad arguments or input, no such model (exit code 2 of a command)."""
+
+
+class FailedError(DeepMuonError):
+    """Failed while running: disk full, a bad muon, a lost race for the output (exit code 1 of a command)."""

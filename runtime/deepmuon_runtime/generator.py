@@ -1,0 +1,359 @@
+"""Muons from a model: as columns, as a stream of chunks, or as a file."""
+
+from __future__ import annotations
+
+import collections.abc
+import hashlib
+import os
+import shlex
+import shutil
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from deepmuon_runtime.errors import FailedError, RefusedError
+from deepmuon_runtime.latent import checked_seed, fill_latents, new_seed
+from deepmuon_runtime.model import Model
+from deepmuon_runtime.muon_file import BYTES_PER_MUON, MuonWriter, check_output
+from deepmuon_runtime.muons import MU_PLUS, Muons
+from deepmuon_runtime.ordered_map import ordered_map
+from deepmuon_runtime.physical import check_physical
+from deepmuon_runtime.poisson import poisson
+from deepmuon_runtime.released import read_released, released_model
+
+if TYPE_CHECKING:
+    import onnxruntime
+
+__all__ = ["LARGEST_NUMBER", "Generator"]
+
+LARGEST_NUMBER = 2**53
+"""The most muons of one run."""
+
+BLOCK = 1 << 14  # muons of one run of the network, about: what it works on stays in the cache
+CHUNK_BLOCKS = 8  # blocks of one task of a thread, and of one write
+LARGEST_MODEL = 2**31 - 1  # bytes: the limit of protobuf, and so of an ONNX file without external data
+
+
+class Generator:
+    """A model that is ready to give muons: open one by `Generator.open`.
+
+    Muon number i of a seed is the same whatever the number of muons, threads and chunks: bit by bit on one
+    type of CPU, and to float32 rounding between types of CPU, or CPU and CUDA. So a shorter run is the
+    beginning of a longer one. To that end the model always runs on whole blocks of draws that begin at
+    multiples of their size.
+
+    Attributes
+    ----------
+    model : Model
+        What the model says of itself.
+    device : str
+        Where it runs, "cpu" or "cuda".
+    threads : int
+        How many blocks are made side by side.
+
+    Examples
+    --------
+    >>> from deepmuon_runtime import Generator
+    >>> muons = Generator.open(depth=10).sample(1000, seed=1)
+    >>> len(muons), bool((muons.w < 0).all())
+    (1000, True)
+    """
+
+    def __init__(self, session: onnxruntime.InferenceSession, model: Model, device: str, threads: int) -> None:
+        self.model = model
+        self.device = device
+        self.threads = threads
+        self._session = session
+        # Multiples of 8 draws: a block begins with a whole step of the random number generator.
+        self._block_draws = max(1, -(-BLOCK // (8 * model.muons_per_draw))) * 8
+
+    @classmethod
+    def open(
+        cls,
+        depth: float | None = None,
+        architecture: str | None = None,
+        *,
+        file: str | Path | None = None,
+        device: str = "auto",
+        threads: int | None = None,
+    ) -> Generator:
+        """Open a released model by its depth, or any model that keeps the ONNX contract by its file.
+
+        Parameters
+        ----------
+        depth
+            Metres of water above the muons.
+        architecture
+            "quantile" or "transformer"; the default one if left out.
+        file
+            An ONNX file, instead of `depth` and `architecture`.
+        device
+            "cpu"; "cuda"; or "auto", which is CUDA where it can be had, else the CPU.
+        threads
+            How many blocks are made side by side; as many as the process may use if left out.
+
+        Raises
+        ------
+        RefusedError
+            If there is no such model, it breaks the contract, or the device can't be had.
+        """
+        from deepmuon_runtime.contract import check_signature, contract_metadata
+        from deepmuon_runtime.device import open_session
+
+        threads = _usable_processors() if threads is None else threads
+        if threads < 1:
+            raise RefusedError(f"{threads} threads can't make muons: 1 or more can")
+        if file is None:
+            if depth is None:
+                raise RefusedError("which model? Give the depth of a released one, or the file of another")
+            released = released_model(depth, architecture)
+            name, content = released.name, read_released(released)
+        else:
+            if depth is not None or architecture is not None:
+                raise RefusedError("a model's file decides its depth and architecture: give the file alone")
+            name, content = str(file), _read_model(Path(file))
+        session, device = open_session(content, name, device)
+        sha256 = hashlib.sha256(content).hexdigest()
+        model = Model.from_metadata(contract_metadata(session), name, sha256, len(content))
+        check_signature(session, model)
+        generator = cls(session, model, device, threads)
+        generator._try()
+        return generator
+
+    def sample(self, n: int, seed: int | None = None) -> Muons:
+        """Return n muons as columns, all in memory.
+
+        Parameters
+        ----------
+        n
+            How many, 0 to 2^53.
+        seed
+            0 to 2^64 - 1; one from the operating system if left out.
+
+        Returns
+        -------
+        Muons [n]
+
+        Raises
+        ------
+        RefusedError
+            If n or the seed is out of range, or the memory does not hold n muons.
+        FailedError
+            If the model gives an unphysical muon.
+        """
+        n, seed = _checked_number(n), _seed(seed)
+        try:
+            muons = Muons.empty(n)
+        except (MemoryError, ValueError) as error:
+            raise RefusedError(f"{n} muons do not fit in memory: take them in chunks, or write a file") from error
+        for _ in ordered_map(lambda span: self._fill(muons[span], seed, span.start), self._spans(n), self.threads):
+            pass
+        return muons
+
+    def chunks(self, n: int, seed: int | None = None) -> collections.abc.Generator[Muons, None, None]:
+        """Yield n muons in pieces of about a hundred thousand, for those who stream.
+
+        The memory needed does not grow with n. The pieces one after the other are `sample(n, seed)`. Whoever
+        stops before the end should close the iterator (`contextlib.closing`), which stops the threads.
+
+        Parameters
+        ----------
+        n, seed
+            As for `sample`.
+
+        Raises
+        ------
+        RefusedError, FailedError
+            As `sample`.
+        """
+        n, seed = _checked_number(n), _seed(seed)
+
+        def chunk(span: slice) -> Muons:
+            muons = Muons.empty(span.stop - span.start)
+            self._fill(muons, seed, span.start)
+            return muons
+
+        return ordered_map(chunk, self._spans(n), self.threads)
+
+    def write(
+        self,
+        path: str | Path,
+        n: int,
+        seed: int | None = None,
+        *,
+        overwrite: bool = False,
+        progress: Callable[[int], object] | None = None,
+        attributes: Mapping[str, object] | None = None,
+    ) -> None:
+        """Write n muons to an HDF5 file, which appears under its name only when it is complete.
+
+        Parameters
+        ----------
+        path
+            The file; its folder must exist.
+        n, seed
+            As for `sample`; the file records the seed.
+        overwrite
+            Whether an existing file may be replaced.
+        progress
+            Called after each piece with the number of muons written since the last call.
+        attributes
+            What the file says beside what a generator always says.
+
+        Raises
+        ------
+        RefusedError
+            If n or the seed is out of range, `path` can't be written, or its disk is too small.
+        FailedError
+            If the model gives an unphysical muon, writing fails, or another process writes `path` meanwhile.
+        """
+        n, seed = _checked_number(n), _seed(seed)
+        _check_space(check_output(path, overwrite).parent, n)
+        described = {**self._attributes(n, seed), **(attributes or {})}
+        with MuonWriter(path, described, overwrite) as writer, closing(self.chunks(n, seed)) as chunks:
+            for muons in chunks:
+                writer.append(muons)
+                if progress is not None:
+                    progress(len(muons))
+
+    def number_in_live_time(self, live_time: float, area: float, seed: int) -> int:
+        """Draw the number of muons that cross a horizontal area: a Poisson number at the model's rate.
+
+        Parameters
+        ----------
+        live_time
+            Seconds.
+        area
+            Square metres.
+        seed
+            0 to 2^64 - 1; the number has a stream of its own, apart from the muons of that seed.
+
+        Raises
+        ------
+        RefusedError
+            If the model does not know its rate, or the expected number is not above 0 and at most 2^53.
+        """
+        if self.model.rate_hz_per_m2 is None:
+            raise RefusedError(f"{self.model.name} does not know its rate: give a number of muons")
+        mean = self.model.rate_hz_per_m2 * live_time * area
+        if not 0 < mean <= LARGEST_NUMBER:
+            raise RefusedError(
+                f"{mean:g} muons are expected in {live_time:g} s on {area:g} m2, and should be 0 to 2^53"
+            )
+        return poisson(mean, checked_seed(seed))
+
+    def _attributes(self, n: int, seed: int) -> dict[str, object]:
+        model = self.model
+        rates = {
+            "rate_hz_per_m2": model.rate_hz_per_m2,
+            "rate_uncertainty_hz_per_m2": model.rate_uncertainty_hz_per_m2,
+        }
+        return {
+            "depth_m": model.depth_m,
+            "medium": model.medium,
+            "seed": np.uint64(seed),
+            "first": 0,
+            "total": n,
+            "shard": "1/1",
+            "model_sha256": model.sha256,
+            "architecture": model.architecture,
+            "device": self.device,
+            "command_line": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
+            **{name: rate for name, rate in rates.items() if rate is not None},
+        }
+
+    def _spans(self, n: int) -> Iterator[slice]:
+        size = CHUNK_BLOCKS * self._block_draws * self.model.muons_per_draw
+        return (slice(start, min(start + size, n)) for start in range(0, n, size))
+
+    def _fill(self, muons: Muons, seed: int, first: int) -> None:
+        """Make the muons from number `first` on, block by block."""
+        size = self._block_draws * self.model.muons_per_draw
+        latent = np.empty((self._block_draws, self.model.latent_size), np.float32)
+        done = 0
+        while done < len(muons):
+            block, skipped = divmod(first + done, size)
+            part = muons[done : done + size - skipped]
+            fill_latents(latent, seed, block * self._block_draws)
+            self._run(latent, skipped, part)
+            check_physical(part, self.model.energy_min_gev, self.model.energy_max_gev, first + done)
+            done += len(part)
+
+    def _run(self, latent: NDArray[np.float32], skipped: int, muons: Muons) -> None:
+        """Turn latents into muons, leave out the first ones, and keep as many as asked for."""
+        from deepmuon_runtime.contract import INPUT, OUTPUTS
+
+        try:
+            energy, direction, charge = self._session.run(OUTPUTS, {INPUT: latent})
+        except Exception as error:  # ONNX Runtime's own classes have no common base
+            reason = str(error).strip().splitlines()[0]
+            raise FailedError(f"the model {self.model.name} failed: {reason}") from error
+        expected = len(latent) * self.model.muons_per_draw
+        if not len(energy) == len(direction) == len(charge) == expected:
+            raise FailedError(
+                f"the model {self.model.name} gave {len(energy)} energies, {len(direction)} directions and "
+                f"{len(charge)} charges, and should give {expected} each"
+            )
+        kept = slice(skipped, skipped + len(muons))
+        muons.kinetic_energy[:] = energy[kept]
+        for axis, column in enumerate((muons.u, muons.v, muons.w)):
+            column[:] = direction[kept, axis]
+        np.multiply(charge[kept], np.int8(MU_PLUS), out=muons.pdg_id)
+
+    def _try(self) -> None:
+        """Refuse a model that fails at the ends or in the middle of its latents."""
+        latent = np.repeat(np.linspace(-1, 1, 5, dtype=np.float32)[:, None], self.model.latent_size, axis=1)
+        muons = Muons.empty(len(latent) * self.model.muons_per_draw)
+        try:
+            self._run(latent, 0, muons)
+            check_physical(muons, self.model.energy_min_gev, self.model.energy_max_gev)
+        except FailedError as error:
+            raise RefusedError(f"{self.model.name} breaks the contract in a trial: {error}") from error
+
+
+def _read_model(path: Path) -> bytes:
+    if path.is_dir() or (path.exists() and not path.is_file()):
+        raise RefusedError(f"{path} is no ONNX file")
+    try:
+        if path.stat().st_size > LARGEST_MODEL:
+            raise RefusedError(f"{path} is no ONNX file: it is larger than 2 GB")
+        return path.read_bytes()
+    except (OSError, ValueError) as error:
+        reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else str(error)
+        raise RefusedError(f"the model {path} can't be read: {reason}") from error
+
+
+def _usable_processors() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _checked_number(n: float) -> int:
+    if not (0 <= n <= LARGEST_NUMBER and n == int(n)):
+        raise RefusedError(f"{n} is no number of muons: a whole number from 0 to 2^53 is")
+    return int(n)
+
+
+def _seed(seed: int | None) -> int:
+    return new_seed() if seed is None else checked_seed(seed)
+
+
+def _check_space(folder: Path, n: int) -> None:
+    needed = n * BYTES_PER_MUON
+    free = shutil.disk_usage(folder).free
+    if needed > free:
+        raise RefusedError(f"{n:,} muons need {_readable(needed)}, and {folder} has {_readable(free)} free")
+
+
+def _readable(size: float) -> str:
+    for unit in ("bytes", "kB", "MB", "GB", "TB"):
+        if size < 1000:
+            return f"{size:.3g} {unit}"
+        size /= 1000
+    return f"{size:.3g} PB"

@@ -1,0 +1,130 @@
+"""Random numbers: the same for ever, and at any position at once.
+
+A seed opens streams of 64-bit words. Word j of a stream is word j mod 4 of Philox4x64-10 (Salmon et al.,
+"Parallel random numbers: as easy as 1, 2, 3", SC 2011) at the counter (j // 4 + 1, 0, 0, 0) under the key
+(seed, stream). That is the sequence of `numpy.random.Philox(key=seed + (stream << 64)).random_raw()`, which
+numpy promises never to change, unlike the methods of its Generator.
+"""
+
+from __future__ import annotations
+
+import secrets
+
+import numpy as np
+from numpy.random import Philox
+from numpy.typing import NDArray
+
+from deepmuon_runtime.errors import RefusedError
+
+__all__ = [
+    "COUNT_STREAM",
+    "LARGEST_SEED",
+    "LATENT_STREAM",
+    "checked_seed",
+    "fill_latents",
+    "latents",
+    "new_seed",
+    "words",
+]
+
+LATENT_STREAM = 0
+"""The stream of the latents."""
+
+COUNT_STREAM = 1
+"""The stream that decides how many muons a live time gives."""
+
+LARGEST_SEED = 2**64 - 1
+
+PIECE = 1 << 13  # words made at once: memory of this size is reused, a larger one is asked of the system anew
+
+
+def new_seed() -> int:
+    """Return a seed from the operating system's randomness, from 0 to 2^63 - 1."""
+    return secrets.randbits(63)
+
+
+def checked_seed(seed: int) -> int:
+    """Return the seed if it is one, from 0 to 2^64 - 1, else raise RefusedError."""
+    if not 0 <= seed <= LARGEST_SEED:
+        raise RefusedError(f"the seed {seed} is not from 0 to 2^64 - 1 ({LARGEST_SEED})")
+    return int(seed)
+
+
+def words(seed: int, stream: int, first: int, count: int) -> NDArray[np.uint64]:
+    """Return words `first` to `first + count - 1` of a stream.
+
+    Parameters
+    ----------
+    seed
+        0 to 2^64 - 1.
+    stream
+        `LATENT_STREAM` or `COUNT_STREAM`.
+    first, count
+        Which words.
+
+    Returns
+    -------
+    uint64 [count]
+    """
+    philox, skipped = _philox(seed, stream, first)
+    return philox.random_raw(skipped + count)[skipped:]
+
+
+def latents(seed: int, first: int, draws: int, latent_size: int) -> NDArray[np.float32]:
+    """Return the latents of consecutive draws: independent, uniform, strictly inside (-1, 1).
+
+    Latent j of draw d is half-word h = d latent_size + j of the stream: the low 32 bits of word h // 2 if h
+    is even, the high ones if it is odd. With s its upper 24 bits as a signed number, the latent is
+    (s + 1/2) / 2^23, an odd multiple of 2^-24, which float32 holds exactly.
+
+    Parameters
+    ----------
+    seed
+        0 to 2^64 - 1.
+    first, draws
+        Which draws.
+    latent_size
+        Latents of a draw.
+
+    Returns
+    -------
+    float32 [draws, latent_size]
+    """
+    latent = np.empty((draws, latent_size), np.float32)
+    fill_latents(latent, seed, first)
+    return latent
+
+
+def fill_latents(latent: NDArray[np.float32], seed: int, first: int) -> None:
+    """Fill an array with the latents of consecutive draws; see `latents`.
+
+    Parameters
+    ----------
+    latent : float32 [draws, latent_size], contiguous
+        What is to be filled.
+    seed
+        0 to 2^64 - 1.
+    first
+        The first of the draws.
+    """
+    flat = latent.reshape(-1)
+    first_word, skipped = divmod(first * latent.shape[1], 2)
+    philox, skipped_words = _philox(seed, LATENT_STREAM, first_word)
+    skipped += 2 * skipped_words
+    done = 0
+    while done < len(flat):
+        raw = philox.random_raw(min(PIECE, (skipped + len(flat) - done + 1) // 2))
+        halves = raw.astype("<u8", copy=False).view("<i4")[skipped : skipped + len(flat) - done]
+        halves >>= 8
+        part = flat[done : done + len(halves)]
+        part[:] = halves
+        part += np.float32(0.5)
+        part *= np.float32(2.0**-23)
+        done += len(part)
+        skipped = 0
+
+
+def _philox(seed: int, stream: int, first: int) -> tuple[Philox, int]:
+    """Return a generator at or just before a word, and how many words are to be skipped."""
+    counter, skipped = divmod(first, 4)  # numpy counts up before it gives the first word
+    return Philox(key=seed + (stream << 64), counter=counter), skipped

@@ -1,0 +1,133 @@
+"""What a generator says of itself: the metadata of the ONNX contract, version 1."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from deepmuon_runtime.errors import RefusedError
+
+__all__ = ["CONTRACT_VERSION", "METADATA_PREFIX", "Model"]
+
+CONTRACT_VERSION = 1
+
+METADATA_PREFIX = "deepmuon."
+"""Begins each key of the contract in a model's `metadata_props`."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A generator's metadata.
+
+    Parameters
+    ----------
+    name
+        Name of the file.
+    sha256
+        Hash of the file, in hexadecimal.
+    size
+        Size of the file in bytes.
+    architecture
+        "quantile", "transformer", or another name.
+    depth_m
+        Depth of the plane that the muons cross, in metres of `medium`.
+    medium
+        What lies above it, by its Geant4 name.
+    muons_per_draw
+        Muons made of one row of latents.
+    latent_size
+        Uniform numbers in one row.
+    energy_min_gev, energy_max_gev
+        Range of the kinetic energy.
+    created_by, licence
+        Program that made the file, and the licence under which it may be used.
+    rate_hz_per_m2, rate_uncertainty_hz_per_m2
+        Muons through a horizontal square metre per second, or None where unknown.
+    metadata
+        All of it as text, without the prefix of the keys.
+    """
+
+    name: str
+    sha256: str
+    size: int
+    architecture: str
+    depth_m: float
+    medium: str
+    muons_per_draw: int
+    latent_size: int
+    energy_min_gev: float
+    energy_max_gev: float
+    created_by: str
+    licence: str
+    rate_hz_per_m2: float | None
+    rate_uncertainty_hz_per_m2: float | None
+    metadata: Mapping[str, str]
+
+    @classmethod
+    def from_metadata(cls, metadata: Mapping[str, Any], name: str, sha256: str, size: int) -> Model:
+        """Read the metadata of a model file.
+
+        Parameters
+        ----------
+        metadata
+            Keys of the contract, without the prefix; values as text or numbers.
+        name, sha256, size
+            As in the class.
+
+        Raises
+        ------
+        RefusedError
+            If a key of the contract is missing or its value is none that it can have.
+        """
+        texts = {key: str(value) for key, value in metadata.items()}
+        missing = [key for key in _REQUIRED if key not in texts]
+        if missing:
+            keys = ", ".join(METADATA_PREFIX + key for key in missing)
+            raise RefusedError(f"{name} breaks the contract: its metadata lacks {keys}")
+        values = {key: _value(name, key, texts[key], rule) for key, rule in _REQUIRED.items()}
+        for key, rule in _OPTIONAL.items():
+            values[key] = _value(name, key, texts[key], rule) if key in texts else None
+        if values["energy_min_gev"] >= values["energy_max_gev"]:
+            raise RefusedError(f"{name} breaks the contract: energy_min_gev is not below energy_max_gev")
+        del values["contract_version"]
+        return cls(name=name, sha256=sha256, size=size, metadata=texts, **values)
+
+
+class _Rule(NamedTuple):
+    """How a value is read from its text, and what it may be."""
+
+    read: Callable[[str], Any]
+    is_good: Callable[[Any], bool]
+    meaning: str
+
+
+_TEXT = _Rule(str, bool, "a text")
+_COUNT = _Rule(int, lambda x: x >= 1, "a whole number from 1 on")
+_POSITIVE = _Rule(float, lambda x: 0 < x < math.inf, "a positive number")
+_NOT_NEGATIVE = _Rule(float, lambda x: 0 <= x < math.inf, "a number from 0 on")
+
+_REQUIRED = {
+    "contract_version": _Rule(int, lambda x: x == CONTRACT_VERSION, f"{CONTRACT_VERSION} for this release"),
+    "architecture": _TEXT,
+    "depth_m": _NOT_NEGATIVE,
+    "medium": _TEXT,
+    "muons_per_draw": _COUNT,
+    "latent_size": _COUNT,
+    "energy_min_gev": _POSITIVE,
+    "energy_max_gev": _POSITIVE,
+    "created_by": _TEXT,
+    "licence": _TEXT,
+}
+_OPTIONAL = {"rate_hz_per_m2": _POSITIVE, "rate_uncertainty_hz_per_m2": _NOT_NEGATIVE}
+
+
+def _value(name: str, key: str, text: str, rule: _Rule) -> Any:
+    try:
+        value = rule.read(text)
+        if rule.is_good(value):
+            return value
+    except ValueError:
+        pass
+    raise RefusedError(f"{name} breaks the contract: {METADATA_PREFIX}{key} is {text!r}, and should be {rule.meaning}")

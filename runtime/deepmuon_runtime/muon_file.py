@@ -1,0 +1,402 @@
+"""Muons in HDF5: the file format, version 1.
+
+::
+
+    /                       format="deepmuon-muons", format_version=1
+    /muons/kinetic_energy   float32  units="GeV"
+    /muons/u, v, w          float32  units="1"
+    /muons/pdg_id           int8     13 = mu-, -13 = mu+
+    /muons attributes       count, depth_m, medium, created, created_by, and what else is known
+
+A file is written under a temporary name in its own folder (`NAME.<8 hex digits>.deepmuon-partial`), flushed
+to disk, and only then linked to its name: under that name there is a complete file or none.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from datetime import datetime, timezone
+from importlib.metadata import version
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import h5py
+import numpy as np
+
+from deepmuon_runtime.errors import FailedError, RefusedError
+from deepmuon_runtime.muons import Muons
+from deepmuon_runtime.quiet_file import QuietFile
+
+__all__ = [
+    "BYTES_PER_MUON",
+    "FORMAT",
+    "FORMAT_VERSION",
+    "PARTIAL_SUFFIX",
+    "MuonWriter",
+    "check_output",
+    "read_attributes",
+    "read_muons",
+    "write_muons",
+]
+
+FORMAT = "deepmuon-muons"
+FORMAT_VERSION = 1
+
+PARTIAL_SUFFIX = ".deepmuon-partial"
+"""Ends the name of a file that is still being written, or that a killed process left behind."""
+
+COLUMNS: dict[str, tuple[np.dtype[Any], str]] = {
+    "kinetic_energy": (np.dtype("<f4"), "GeV"),
+    "u": (np.dtype("<f4"), "1"),
+    "v": (np.dtype("<f4"), "1"),
+    "w": (np.dtype("<f4"), "1"),
+    "pdg_id": (np.dtype("i1"), "1"),
+}
+REQUIRED_ATTRIBUTES = ("count", "depth_m", "medium", "created", "created_by")
+
+BYTES_PER_MUON = sum(dtype.itemsize for dtype, _ in COLUMNS.values())
+
+LARGEST_CHUNK = 1 << 17  # muons of one HDF5 chunk: smaller ones cost time and memory, larger ones gain nothing
+SMALLEST_CHUNK = 1 << 10  # but a file of a few muons should not carry a large empty chunk
+
+
+def check_output(path: str | Path, overwrite: bool = False) -> Path:
+    """Tell whether a muon file can be written at `path`, before any muon is made.
+
+    Parameters
+    ----------
+    path
+        The wanted file; a symbolic link is followed.
+    overwrite
+        Whether a file that exists may be replaced.
+
+    Returns
+    -------
+    The absolute path, links followed.
+
+    Raises
+    ------
+    RefusedError
+        If something other than a file is there, or a file and `overwrite` is false, or its folder is missing
+        or not writable.
+    """
+    try:
+        target = Path(os.path.realpath(path))
+        if target.is_dir():
+            raise RefusedError(f"{path} is a folder: give the name of a file in it")
+        if target.exists() and not target.is_file():
+            raise RefusedError(f"{path} is a device or a pipe, and HDF5 needs a regular file")
+        if target.exists() and not overwrite:
+            raise RefusedError(
+                f"{path} exists already: choose another name, or ask for it to be overwritten (--overwrite)"
+            )
+        if not target.parent.is_dir():
+            raise RefusedError(f"{path} can't be written: there is no folder {target.parent}")
+        if not os.access(target.parent, os.W_OK | os.X_OK):
+            raise RefusedError(f"{path} can't be written: the folder {target.parent} is not writable")
+    except (OSError, ValueError) as error:  # a name too long, a null byte, a folder that may not be searched
+        raise RefusedError(f"{path} can't be written: {_reason(error)}") from error
+    return target
+
+
+class MuonWriter:
+    """Writes a muon file piece by piece, and gives it its name only when it is complete.
+
+    Use it in a `with` statement. If the body raises, or is interrupted, nothing is left behind.
+
+    Parameters
+    ----------
+    path
+        The file to be written; its folder must exist.
+    attributes
+        What the file says of its muons: `depth_m` and `medium` at least; strings, numbers, booleans, or lists
+        of strings. `count` and `created` are added, `created_by` unless given, and
+        `live_time_s_m2 = count / rate_hz_per_m2` where the rate is.
+    overwrite
+        Whether an existing file is replaced, at the moment when the new one is complete.
+
+    Attributes
+    ----------
+    path : Path
+        The absolute path of the file, links followed.
+    count : int
+        Muons written so far.
+
+    Raises
+    ------
+    RefusedError
+        On construction and entry, if `path` can't be written or an attribute is missing.
+    FailedError
+        Later, if writing fails (disk full), or another process has written `path` meanwhile.
+    """
+
+    # HDF5 calls back into Python (QuietFile), and must not meet a KeyboardInterrupt there. Python handles
+    # signals in the main thread only, so all calls of HDF5 are made by a thread of their own.
+
+    def __init__(self, path: str | Path, attributes: Mapping[str, object], overwrite: bool = False) -> None:
+        self.path = check_output(path, overwrite)
+        missing = [name for name in ("depth_m", "medium") if name not in attributes]
+        if missing:
+            raise RefusedError(f"a muon file must say its {' and '.join(missing)}: add it to the attributes")
+        self.count = 0
+        self._attributes = dict(attributes)
+        self._overwrite = overwrite
+        self._partial = self.path.with_name(f"{self.path.name}.{secrets.token_hex(4)}{PARTIAL_SUFFIX}")
+        self._columns: dict[str, h5py.Dataset] = {}
+
+    def __enter__(self) -> MuonWriter:
+        """Create the temporary file."""
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="muon-writer")
+        try:
+            self._in_thread(self._open)
+        except BaseException as error:
+            self._discard()
+            if isinstance(error, OSError):
+                raise RefusedError(f"{self.path} can't be written: {_reason(error)}") from error
+            raise
+        return self
+
+    def append(self, muons: Muons) -> None:
+        """Write muons after those already written.
+
+        Raises
+        ------
+        FailedError
+            If they can't be written, for instance on a full disk.
+        """
+        with self._failures():
+            self._in_thread(self._append, muons)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Publish the file, or remove it if the body raised."""
+        try:
+            if kind is None:
+                with self._failures():
+                    self._in_thread(self._finish)
+                    self._publish()
+        finally:
+            self._discard()
+
+    def _in_thread(self, function: Callable[..., None], *arguments: object) -> None:
+        self._thread.submit(function, *arguments).result()
+
+    def _open(self) -> None:
+        self._backing = QuietFile(str(self._partial))
+        # Whole chunks go straight to the file: a cache would only copy them once more.
+        self._file = h5py.File(self._backing, "w", rdcc_nbytes=0)
+
+    def _append(self, muons: Muons) -> None:
+        if not self._columns:
+            self._create_columns(len(muons))
+        end = self.count + len(muons)
+        for name, column in self._columns.items():
+            column.resize((end,))
+            column[self.count : end] = getattr(muons, name)
+        self.count = end
+        self._raise_fault()
+
+    def _create_columns(self, first_length: int) -> None:
+        chunk = min(max(first_length, SMALLEST_CHUNK), LARGEST_CHUNK)
+        group = self._file.create_group("muons")
+        for name, (dtype, units) in COLUMNS.items():
+            column = group.create_dataset(name, shape=(0,), maxshape=(None,), chunks=(chunk,), dtype=dtype)
+            column.attrs["units"] = units
+            self._columns[name] = column
+
+    def _finish(self) -> None:
+        """Write the attributes, and all that is in memory to the disk."""
+        if not self._columns:
+            self._create_columns(0)
+        self._file.attrs["format"] = FORMAT
+        self._file.attrs["format_version"] = FORMAT_VERSION
+        for name, value in self._all_attributes().items():
+            if isinstance(value, (list, tuple)):
+                self._file["muons"].attrs.create(name, list(value), dtype=h5py.string_dtype())
+            else:
+                self._file["muons"].attrs[name] = value
+        self._file.close()
+        self._raise_fault()
+        os.fsync(self._backing.fileno())
+
+    def _all_attributes(self) -> dict[str, object]:
+        attributes = {"created_by": f"deepmuon-runtime {version('deepmuon-runtime')}", **self._attributes}
+        attributes["count"] = self.count
+        attributes["created"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
+        rate = attributes.get("rate_hz_per_m2")
+        if isinstance(rate, (int, float, np.number)) and rate > 0:
+            attributes["live_time_s_m2"] = self.count / float(rate)
+        return attributes
+
+    def _publish(self) -> None:
+        if self._overwrite:
+            os.replace(self._partial, self.path)
+        else:
+            _link(self._partial, self.path)
+        _flush_names_to_disk(self.path.parent)
+
+    def _raise_fault(self) -> None:
+        if self._backing.error is not None:
+            raise self._backing.error
+
+    @contextmanager
+    def _failures(self) -> Iterator[None]:
+        try:
+            yield
+        except FileExistsError as error:
+            raise FailedError(f"{self.path} was written by another process meanwhile: kept as it is") from error
+        except OSError as error:
+            raise FailedError(f"{self.path} was not written: {_reason(error)}") from error
+
+    def _discard(self) -> None:
+        """Let go of the temporary file, and of its temporary name."""
+        self._in_thread(self._close)
+        self._thread.shutdown()
+        with suppress(OSError):  # never made, already in its place, or its folder is gone
+            self._partial.unlink()
+
+    def _close(self) -> None:
+        for file in (getattr(self, "_file", None), getattr(self, "_backing", None)):
+            if file is not None:
+                file.close()
+
+
+def write_muons(path: str | Path, muons: Muons, attributes: Mapping[str, object], overwrite: bool = False) -> None:
+    """Write muons to a new file.
+
+    Parameters
+    ----------
+    path, attributes, overwrite
+        As for `MuonWriter`.
+    muons
+        The muons.
+
+    Raises
+    ------
+    RefusedError, FailedError
+        As for `MuonWriter`.
+    """
+    with MuonWriter(path, attributes, overwrite) as writer:
+        writer.append(muons)
+
+
+def read_muons(path: str | Path, first: int = 0, count: int | None = None) -> Muons:
+    """Read muons from a file.
+
+    Parameters
+    ----------
+    path
+        A muon file, format version 1.
+    first
+        Position of the first muon wanted, from 0.
+    count
+        How many; all that follow `first` if left out.
+
+    Returns
+    -------
+    Muons [count]
+
+    Raises
+    ------
+    RefusedError
+        If the file can't be read, is no muon file, or does not hold the muons asked for.
+    """
+    with _opened(path) as group:
+        total = len(group["kinetic_energy"])
+        end = total if count is None else first + count
+        if not 0 <= first <= end <= total:
+            raise RefusedError(f"{path} holds {total} muons: those from {first} to {end} can't be read")
+        return Muons(**{name: group[name][first:end] for name in COLUMNS})
+
+
+def read_attributes(path: str | Path) -> dict[str, Any]:
+    """Read what a file says of its muons.
+
+    Parameters
+    ----------
+    path
+        A muon file, format version 1.
+
+    Returns
+    -------
+    All attributes of `/muons` as Python's str, int, float, bool, and lists of str.
+
+    Raises
+    ------
+    RefusedError
+        If the file can't be read or is no muon file.
+    """
+    with _opened(path) as group:
+        return {name: _python_value(value) for name, value in group.attrs.items()}
+
+
+@contextmanager
+def _opened(path: str | Path) -> Iterator[h5py.Group]:
+    """Open the group `/muons` of a file that keeps the format, turning HDF5's errors into one line."""
+    try:
+        with h5py.File(path, "r") as file:
+            yield _checked(file, path)
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, MemoryError) as error:
+        raise RefusedError(f"{path} can't be read as a muon file: {_reason(error)}") from error
+
+
+def _checked(file: h5py.File, path: str | Path) -> h5py.Group:
+    form, form_version = file.attrs.get("format"), file.attrs.get("format_version")
+    if form != FORMAT:
+        raise RefusedError(f"{path} is no muon file: it lacks the attribute format={FORMAT!r}")
+    if form_version != FORMAT_VERSION:
+        raise RefusedError(f"{path} has format version {form_version}, and this release reads version {FORMAT_VERSION}")
+    group = file.get("muons")
+    if not isinstance(group, h5py.Group):
+        raise RefusedError(f"{path} has no group /muons")
+    for name in REQUIRED_ATTRIBUTES:
+        if name not in group.attrs:
+            raise RefusedError(f"{path} lacks the attribute {name} of /muons")
+    count = group.attrs["count"]
+    for name, (dtype, _) in COLUMNS.items():
+        column = group.get(name)
+        if not isinstance(column, h5py.Dataset) or column.dtype != dtype or column.shape != (count,):
+            found = f"{column.dtype} {column.shape}" if isinstance(column, h5py.Dataset) else "none"
+            raise RefusedError(f"{path}: the column {name} should be {dtype} of ({count},), and is {found}")
+    return group
+
+
+def _python_value(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _link(source: Path, target: Path) -> None:
+    """Give the complete file its name, unless the name is taken: then raise FileExistsError."""
+    try:
+        os.link(source, target)
+    except OSError as error:
+        if error.errno not in (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK):
+            raise
+        # A file system without hard links (FAT, some network ones): reserve the name, then move over it.
+        os.close(os.open(target, os.O_CREAT | os.O_EXCL))
+        os.replace(source, target)
+
+
+def _flush_names_to_disk(folder: Path) -> None:
+    """Make the names in a folder survive a loss of power."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _reason(error: BaseException) -> str:
+    """Return the cause in one line."""
+    if isinstance(error, OSError) and error.errno:
+        return os.strerror(error.errno)
+    return " ".join(str(error).split()) or type(error).__name__

@@ -1,0 +1,75 @@
+"""A set of muons as columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["MU_MINUS", "MU_PLUS", "Muons"]
+
+MU_MINUS = 13
+"""PDG particle number of the negative muon."""
+
+MU_PLUS = -13
+"""PDG particle number of the positive muon."""
+
+
+@dataclass(frozen=True)
+class Muons:
+    """Muons crossing a horizontal plane, one array per column, all of one length n.
+
+    Parameters
+    ----------
+    kinetic_energy : float32 [n]
+        Kinetic energy in GeV.
+    u, v, w : float32 [n]
+        Direction of motion, a unit vector; z is up, so w < 0 is downward.
+    pdg_id : int8 [n]
+        13 for mu-, -13 for mu+.
+    """
+
+    kinetic_energy: NDArray[np.float32]
+    u: NDArray[np.float32]
+    v: NDArray[np.float32]
+    w: NDArray[np.float32]
+    pdg_id: NDArray[np.int8]
+
+    @property
+    def charge(self) -> NDArray[np.int8]:
+        """Electric charge in e, -1 or +1: int8 [n]."""
+        return -np.sign(self.pdg_id)
+
+    @property
+    def cos_zenith(self) -> NDArray[np.float32]:
+        """Cosine of the zenith angle from which the muon comes, -w: float32 [n]."""
+        return -self.w
+
+    def __len__(self) -> int:
+        """Return the number of muons."""
+        return len(self.kinetic_energy)
+
+    def __getitem__(self, index: slice | NDArray[Any]) -> Muons:
+        """Select muons by a slice (views), a mask or an array of positions (copies)."""
+        return Muons(**{name: getattr(self, name)[index] for name in self.__dataclass_fields__})
+
+    @classmethod
+    def empty(cls, n: int) -> Muons:
+        """Return n muons whose columns are yet to be filled."""
+        energy, u, v, w = (np.empty(n, np.float32) for _ in range(4))
+        return cls(energy, u, v, w, np.empty(n, np.int8))
+
+    @classmethod
+    def of(cls, kinetic_energy: ArrayLike, u: ArrayLike, v: ArrayLike, w: ArrayLike, pdg_id: ArrayLike) -> Muons:
+        """Make a set from columns of any number type."""
+        energy, x, y, z = (np.asarray(column, dtype=np.float32) for column in (kinetic_energy, u, v, w))
+        return cls(energy, x, y, z, np.asarray(pdg_id, dtype=np.int8))
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[Muons]) -> Muons:
+        """Join several sets, in order."""
+        names = cls.__dataclass_fields__
+        return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})

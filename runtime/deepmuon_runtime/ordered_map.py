@@ -1,0 +1,40 @@
+"""A function over many items in parallel, its results in order, never many of them in memory."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Generator, Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
+
+__all__ = ["ordered_map"]
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def ordered_map(
+    function: Callable[[Item], Result], items: Iterable[Item], threads: int
+) -> Generator[Result, None, None]:
+    """Yield `function(item)` for each item, in order, computed ahead by threads.
+
+    Parameters
+    ----------
+    function
+        What to compute; it gains from threads as far as it lets go of Python's lock.
+    items
+        Taken one by one as they are needed.
+    threads
+        How many run side by side. As many results again may wait for the caller, and not more.
+    """
+    pending: deque[Future[Result]] = deque()
+    pool = ThreadPoolExecutor(threads, thread_name_prefix="muons")
+    try:
+        for item in items:
+            pending.append(pool.submit(function, item))
+            if len(pending) > 2 * threads:
+                yield pending.popleft().result()
+        while pending:
+            yield pending.popleft().result()
+    finally:
+        pool.shutdown(cancel_futures=True)

@@ -1,0 +1,330 @@
+from __future__ import annotations
+
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.tiny_models import RARELY_BAD, tiny_model
+
+from deepmuon_cli.gen import main
+from deepmuon_runtime import Generator, read_attributes, read_muons
+
+COMMAND = [sys.executable, "-m", "deepmuon_cli.gen"]
+
+
+@pytest.fixture
+def gen(tmp_path, monkeypatch, capsys):
+    """Run the command in this process, in a folder of its own: exit code, stdout, stderr."""
+    folder = tmp_path / "here"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["/bin/deepmuon-gen", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return ended.value.code, *capsys.readouterr()
+
+    yield run
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+
+
+def files() -> list[str]:
+    return sorted(os.listdir())
+
+
+@pytest.mark.usefixtures("released")
+def test_the_main_job_gives_the_muons_of_the_model_and_says_so(gen):
+    code, out, err = gen("--depth", "10", "-n", "1_000", "-o", "muons.h5", "--seed", 7)
+    assert (code, err) == (0, "")
+    assert re.fullmatch(
+        r"muons\.h5: 1,000 muons in \d+\.\d\d s, [\d,]+ muons/s on cpu, "
+        r"equivalent live time 18\.0 s for 1 m2, seed 7\n",
+        out,
+    )
+    assert files() == ["muons.h5"]
+    expected = Generator.open(10).sample(1000, seed=7)
+    assert np.array_equal(read_muons("muons.h5").kinetic_energy, expected.kinetic_energy)
+    attributes = read_attributes("muons.h5")
+    assert attributes["command_line"] == "deepmuon-gen --depth 10 -n 1_000 -o muons.h5 --seed 7"
+    assert attributes["live_time_s_m2"] == 1000 / 55.5
+
+
+def test_a_model_of_ones_own_is_taken_from_its_file(gen, model_file):
+    assert gen("--model", model_file, "-n", 10, "-o", "muons.h5")[0] == 0
+    assert len(read_muons("muons.h5")) == 10
+
+
+@pytest.mark.usefixtures("released")
+def test_an_architecture_can_be_chosen(gen):
+    code, *_ = gen("--depth", 10, "--architecture", "transformer", "-n", 10, "-o", "muons.h5")
+    assert code == 0
+    assert read_attributes("muons.h5")["architecture"] == "transformer"
+
+
+@pytest.mark.parametrize(
+    ("text", "n"), [("10", 10), ("1e3", 1000), ("1_000", 1000), ("2.5e1", 25), ("1E2", 100), ("+7", 7)]
+)
+def test_numbers_are_exact_however_they_are_written(gen, model_file, text, n):
+    assert gen("--model", model_file, f"-n{text}", "-o", "muons.h5")[0] == 0
+    assert read_attributes("muons.h5")["count"] == n
+
+
+def test_a_seed_that_is_left_out_is_new_and_reported(gen, model_file):
+    seeds = []
+    for name in ("a.h5", "b.h5"):
+        _, out, _ = gen("--model", model_file, "-n", 10, "-o", name)
+        seeds.append(read_attributes(name)["seed"])
+        assert out.endswith(f"seed {seeds[-1]}\n")
+    assert seeds[0] != seeds[1]
+
+
+def test_the_largest_seed_is_a_seed(gen, model_file):
+    assert gen("--model", model_file, "-n", 1, "-o", "a.h5", "--seed", 2**64 - 1)[0] == 0
+    assert read_attributes("a.h5")["seed"] == 2**64 - 1
+
+
+def test_threads_change_nothing(gen, model_file):
+    for threads in (1, 3):
+        name = f"{threads}.h5"
+        assert gen("--model", model_file, "-n", "2e5", "-o", name, "--seed", 1, "--threads", threads)[0] == 0
+    for column in ("kinetic_energy", "u", "v", "w", "pdg_id"):
+        assert np.array_equal(getattr(read_muons("1.h5"), column), getattr(read_muons("3.h5"), column))
+
+
+def test_a_live_time_gives_a_poisson_number_at_the_models_rate(gen, model_file):
+    """At 5 standard deviations of the sum of 20 numbers: 1e-6 false alarms."""
+    counts = []
+    for seed in range(20):
+        arguments = ("--live-time", "1e2", "--area", "0.5", "-o", f"{seed}.h5", "--seed", seed)
+        assert gen("--model", model_file, *arguments)[0] == 0
+        attributes = read_attributes(f"{seed}.h5")
+        assert attributes["count"] == attributes["total"] == len(read_muons(f"{seed}.h5"))
+        assert (attributes["live_time_s"], attributes["area_m2"]) == (100, 0.5)
+        counts.append(attributes["count"])
+    assert len(set(counts)) > 5
+    assert abs(sum(counts) - 20 * 55.5 * 50) < 5 * np.sqrt(20 * 55.5 * 50)
+
+
+def test_a_short_live_time_may_give_no_muon(gen, model_file):
+    assert gen("--model", model_file, "--live-time", 1e-9, "--area", 1, "-o", "none.h5")[0] == 0
+    assert len(read_muons("none.h5")) == 0
+
+
+def test_quiet_says_nothing(gen, model_file):
+    assert gen("--model", model_file, "-n", 10, "-o", "muons.h5", "--quiet") == (0, "", "")
+
+
+def test_an_existing_output_is_replaced_only_where_asked(gen, model_file):
+    arguments = ("--model", model_file, "-o", "muons.h5")
+    assert gen(*arguments, "-n", 10)[0] == 0
+    code, _, err = gen(*arguments, "-n", 20)
+    assert code == 2
+    assert "exists already" in err
+    assert "--overwrite" in err
+    assert len(read_muons("muons.h5")) == 10
+    assert gen(*arguments, "-n", 20, "--overwrite")[0] == 0
+    assert len(read_muons("muons.h5")) == 20
+    assert files() == ["muons.h5"]
+
+
+@pytest.mark.usefixtures("released")
+def test_the_list_shows_every_model_and_the_default(gen):
+    code, out, err = gen("--list")
+    assert (code, err) == (0, "")
+    rows = [line.split() for line in out.splitlines()]
+    assert [row[:3] for row in rows[1:-1]] == [
+        ["quantile*", "0", "110.00"],
+        ["quantile*", "10", "55.50"],
+        ["transformer", "10", "55.50"],
+    ]
+
+
+def test_the_version_is_the_distributions(gen):
+    code, out, _ = gen("--version")
+    assert code == 0
+    assert re.fullmatch(r"deepmuon-gen \d+\.\d+\.\d+\S*\n", out)
+
+
+def test_the_help_teaches_by_an_example(gen):
+    code, out, _ = gen("--help")
+    assert code == 0
+    assert "\n      deepmuon-gen --depth 10 -n 1e7 -o muons.h5\n" in out
+    options = """--depth --architecture --model --number --output --seed --device --threads --overwrite
+        --list --quiet --version --live-time --area"""
+    assert all(option in out for option in options.split())
+
+
+def test_help_is_there_before_any_library_is_loaded():
+    program = (
+        "import sys; from deepmuon_cli.gen import main; sys.argv = ['deepmuon-gen', '--help']\n"
+        "try: main()\n"
+        "except SystemExit: print(sorted({'numpy', 'h5py', 'onnxruntime', 'torch'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.endswith("\n[]\n")
+
+
+def test_neither_torch_nor_onnx_is_needed_for_muons(model_file, tmp_path):
+    program = f"""
+import sys
+sys.modules["torch"] = sys.modules["onnx"] = None  # an import of them fails
+sys.argv = ["deepmuon-gen", "--model", {str(model_file)!r}, "-n", "10", "-o", "muons.h5"]
+from deepmuon_cli.gen import main
+main()
+"""
+    subprocess.run([sys.executable, "-c", program], cwd=tmp_path, check=True)
+    assert len(read_muons(tmp_path / "muons.h5")) == 10
+
+
+GOOD = {"--depth": "10", "-n": "10", "-o": "muons.h5"}
+
+
+@pytest.mark.usefixtures("released")
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"-n": "0"}, "0 muons can't be made: the number is from 1 to 2^53"),
+        ({"-n": "-5"}, "-5 muons can't be made"),
+        ({"-n": "1.5"}, "1.5 is not a whole number"),
+        ({"-n": "1e-3"}, "1e-3 is not a whole number"),
+        ({"-n": "nan"}, "nan muons can't be made"),
+        ({"-n": "inf"}, "inf muons can't be made"),
+        ({"-n": str(2**53 + 1)}, "muons can't be made: the number is from 1 to 2^53"),
+        ({"-n": "1e999999999"}, "muons can't be made"),
+        ({"-n": "many"}, "many is no number: write for instance 1e7"),
+        ({"-n": ""}, "is no number"),
+        ({"-n": "1e15"}, "1,000,000,000,000,000 muons need 17 PB, and"),
+        ({"-n": None}, "how many muons? Give -n"),
+        ({"--live-time": "10", "--area": "1"}, "-n goes without --live-time"),
+        ({"-n": None, "--live-time": "10"}, "--live-time and --area go together"),
+        ({"-n": None, "--area": "1"}, "--live-time and --area go together"),
+        ({"-n": None, "--live-time": "0", "--area": "1"}, "0 is not a finite number above 0"),
+        ({"-n": None, "--live-time": "10", "--area": "-1"}, "-1 is not a finite number above 0"),
+        ({"-n": None, "--live-time": "nan", "--area": "1"}, "nan is not a finite number above 0"),
+        ({"-n": None, "--live-time": "1e300", "--area": "1"}, "muons are expected"),
+        ({"-n": None, "--live-time": "long", "--area": "1"}, "long is no number"),
+        ({"--seed": "-1"}, "-1 is not from 0 to 2^64 - 1"),
+        ({"--seed": str(2**64)}, "is not from 0 to 2^64 - 1"),
+        ({"--seed": "0.5"}, "0.5 is not a whole number"),
+        ({"--threads": "0"}, "0 threads can't make muons"),
+        ({"--threads": "-2"}, "-2 threads can't make muons"),
+        ({"--threads": "two"}, "'two' is not a valid integer"),
+        ({"--depth": "12"}, "no quantile model for a depth of 12 m: there are 0 and 10 m"),
+        ({"--depth": "nan"}, "there are 0 and 10 m"),
+        ({"--depth": "deep"}, "'deep' is not a valid float"),
+        ({"--depth": None}, "which muons? Give --depth METRES"),
+        ({"--architecture": "flow"}, "there are quantile and transformer"),
+        ({"--model": "model.onnx"}, "--model goes without --depth"),
+        ({"--depth": None, "--model": "missing.onnx"}, "No such file"),
+        ({"--depth": None, "--model": "."}, "is no ONNX file"),
+        ({"--device": "gpu"}, "there are auto, cpu, cuda"),
+        ({"-o": None}, "where to?"),
+        ({"-o": "."}, "is a folder"),
+        ({"-o": "/dev/null"}, "is a device or a pipe"),
+        ({"-o": "missing/muons.h5"}, "there is no folder"),
+        ({"-o": "/proc/muons.h5"}, "/proc has 0 bytes free"),
+        ({"--dept": "10"}, "--depth"),
+    ],
+)
+def test_what_can_not_be_done_is_refused_in_one_line_and_leaves_nothing(gen, changes, reason):
+    options = {**GOOD, **changes}
+    arguments = [word for name, value in options.items() if value is not None for word in (name, value)]
+    code, out, err = gen(*arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("deepmuon-gen: ")
+    assert err.count("\n") == 1
+    assert reason in err
+    assert files() == []
+
+
+def test_a_released_model_that_fails_its_hash_is_refused(gen, released):
+    file = released / "deepmuon_models" / "quantile-10m.onnx"
+    file.write_bytes(tiny_model(metadata={"depth_m": "11.0"}))
+    code, _, err = gen("--depth", 10, "-n", 10, "-o", "muons.h5")
+    assert code == 2
+    assert "is damaged: its SHA-256 is" in err
+    assert files() == []
+
+
+@pytest.mark.parametrize("content", [b"no ONNX", tiny_model(metadata={"depth_m": None})])
+def test_a_file_that_is_no_model_is_refused(gen, model_file, content):
+    model_file.write_bytes(content)
+    code, _, err = gen("--model", model_file, "-n", 10, "-o", "muons.h5")
+    assert code == 2
+    assert err.count("\n") == 1
+    assert files() == []
+
+
+def test_a_model_that_gives_a_bad_muon_is_a_failure_that_leaves_nothing(gen, model_file):
+    model_file.write_bytes(tiny_model(edits=RARELY_BAD))
+    code, out, err = gen("--model", model_file, "-n", "1e6", "-o", "muons.h5", "--seed", 1)
+    assert (code, out) == (1, "")
+    assert re.search(r"bad muon: number \d+ has a kinetic energy outside", err)
+    assert files() == []
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)], ids=["Ctrl-C", "SIGTERM"])
+def test_a_stopped_command_leaves_nothing(model_file, tmp_path, number, code):
+    folder = tmp_path / "here"
+    folder.mkdir()
+    process = subprocess.Popen(
+        [*COMMAND, "--model", str(model_file), "-n", "1e8", "-o", "muons.h5"],
+        cwd=folder,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    wait_for_partial_file(folder)
+    process.send_signal(number)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == code
+    assert err == f"deepmuon-gen: stopped by {number.name}\n"
+    assert list(folder.iterdir()) == []
+
+
+def wait_for_partial_file(folder: Path) -> None:
+    """Wait until muons are being written."""
+    end = time.monotonic() + 60
+    while not any(path.stat().st_size > 1_000_000 for path in folder.glob("*.deepmuon-partial")):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def test_a_bar_shows_the_progress_on_a_terminal(model_file, tmp_path):
+    terminal, stderr = pty.openpty()
+    subprocess.run(
+        [*COMMAND, "--model", str(model_file), "-n", "3e5", "-o", "muons.h5"],
+        cwd=tmp_path,
+        stdout=subprocess.DEVNULL,
+        stderr=stderr,
+        check=True,
+    )
+    os.close(stderr)
+    assert b"100%" in os.read(terminal, 10_000)
+    os.close(terminal)
+
+
+def test_a_warning_is_one_line(gen, model_file, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    for package in ("onnxruntime", "onnxruntime_gpu"):
+        metadata = tmp_path / f"{package}-1.20.0.dist-info" / "METADATA"
+        metadata.parent.mkdir()
+        metadata.write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.20.0\n")
+    program = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from deepmuon_cli.gen import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", program, "--model", str(model_file), "-n", "10", "-o", "muons.h5"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stderr.startswith("deepmuon-gen: warning: onnxruntime and onnxruntime-gpu are both installed")
+    assert done.stderr.count("\n") == 1

@@ -1,0 +1,32 @@
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from support.tiny_models import release, tiny_model
+
+
+@pytest.fixture
+def model_file(tmp_path: Path) -> Path:
+    """A model that keeps the contract, one muon a draw."""
+    path = tmp_path / "tiny.onnx"
+    path.write_bytes(tiny_model())
+    return path
+
+
+@pytest.fixture
+def released(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder on Python's path with a package of small released models, in place of the real one."""
+    folder = tmp_path / "released"
+    release(
+        folder,
+        {
+            "quantile-0m.onnx": tiny_model(metadata={"depth_m": "0.0", "rate_hz_per_m2": "110.0"}),
+            "quantile-10m.onnx": tiny_model(),
+            "transformer-10m.onnx": tiny_model(8, {"architecture": "transformer"}),
+        },
+    )
+    monkeypatch.delitem(sys.modules, "deepmuon_models", raising=False)
+    monkeypatch.syspath_prepend(folder)
+    return folder

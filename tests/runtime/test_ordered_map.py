@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+import threading
+import time
+from contextlib import closing
+
+import pytest
+
+from deepmuon_runtime.ordered_map import ordered_map
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_results_come_in_the_order_of_the_items(threads):
+    def slow_if_early(item: int) -> int:
+        time.sleep(0.002 * (item % 3 == 0))
+        return item * item
+
+    assert list(ordered_map(slow_if_early, range(40), threads)) == [item * item for item in range(40)]
+
+
+def test_as_many_run_side_by_side_as_there_are_threads():
+    together = threading.Barrier(3, timeout=20)
+    assert len(list(ordered_map(lambda _: together.wait(), range(3), 3))) == 3
+
+
+def test_no_more_is_taken_than_the_caller_needs_soon():
+    items = iter(range(1000))
+    with closing(ordered_map(lambda item: item, items, 2)) as results:
+        assert [next(results) for _ in range(10)] == list(range(10))
+        assert next(items) <= 10 + 2 * 2
+
+
+def test_an_error_comes_in_its_turn_and_ends_the_rest():
+    done = []
+
+    def fail_at_three(item: int) -> int:
+        if item == 3:
+            raise ValueError("three")
+        return item
+
+    def collect() -> None:
+        for result in ordered_map(fail_at_three, range(1000), 2):
+            done.append(result)
+
+    with pytest.raises(ValueError, match="three"):
+        collect()
+    assert done == [0, 1, 2]
