@@ -1,0 +1,1 @@
+"""Trains DeepMuon generators and exports them to ONNX."""
