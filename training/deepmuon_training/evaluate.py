@@ -1,0 +1,210 @@
+"""Evaluates generated muons against held-out ones, every score with the noise of two alike samples."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.muons import Muons
+from deepmuon_training.azimuth import AzimuthScore, compare_azimuth
+from deepmuon_training.chi_square import ChiSquare
+from deepmuon_training.classifier import ClassifierScore, classify
+from deepmuon_training.histogram_scores import (
+    CellScore,
+    Counts,
+    EnergyBin,
+    TailScore,
+    compare_cells,
+    compare_charge,
+    compare_energy_bins,
+    compare_tails,
+    count_muons,
+)
+from deepmuon_training.independence import Independence, measure_independence
+from deepmuon_training.kolmogorov_smirnov import KolmogorovSmirnov, kolmogorov_smirnov
+from deepmuon_training.records import from_json, to_json
+from deepmuon_training.scorecard import Score, judge, markdown_table, scorecard
+from deepmuon_training.totals import (
+    ChargeRatio,
+    RateScore,
+    UnphysicalMuons,
+    compare_charge_ratio,
+    compare_rate,
+    count_unphysical,
+    is_physical,
+)
+
+__all__ = ["FEWEST_MUONS", "Evaluation", "Spectra", "evaluate"]
+
+FEWEST_MUONS = 100_000
+"""Physical muons that either sample must hold: the scores' noise is that of large samples."""
+
+
+@dataclass(frozen=True)
+class Spectra:
+    """Counts to draw, under- and overflow first and last where there are any.
+
+    Parameters
+    ----------
+    plus_by_energy, minus_by_energy : tuple of int, [52]
+        mu+ and mu- in the bins of `histogram_scores.ENERGY_EDGES`.
+    by_cos_zenith : tuple of int, [20]
+        Muons in bins of 0.05, from the horizon to the vertical.
+    """
+
+    plus_by_energy: tuple[int, ...]
+    minus_by_energy: tuple[int, ...]
+    by_cos_zenith: tuple[int, ...]
+
+    @classmethod
+    def of(cls, counts: Counts) -> Spectra:
+        """Sum the table of `histogram_scores.count_muons`."""
+        minus, plus = counts.sum(axis=2).tolist()
+        return cls(tuple(plus), tuple(minus), tuple(counts.sum(axis=(0, 1)).tolist()))
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """All scores of one generated set against one held-out set.
+
+    Parameters
+    ----------
+    generated_muons, held_out_muons : int
+        Physical muons that were compared.
+    muons_per_draw, seed : int
+        As given.
+    ks : dict of KolmogorovSmirnov
+        By column: "energy", "u", "v", "cos zenith".
+    cells : CellScore
+        On CRY's cells.
+    cells_against_raw : CellScore or None
+        The same against muons whose histogram steps were not taken out.
+    energy_bins, tails, charge, charge_ratio, azimuth, classifier, independence, unphysical, rate
+        See their classes; rate is None where one is unknown.
+    generated_spectra, held_out_spectra : Spectra
+        What the pictures show.
+    """
+
+    generated_muons: int
+    held_out_muons: int
+    muons_per_draw: int
+    seed: int
+    ks: dict[str, KolmogorovSmirnov]
+    cells: CellScore
+    cells_against_raw: CellScore | None
+    energy_bins: tuple[EnergyBin, ...]
+    tails: tuple[TailScore, ...]
+    charge: ChiSquare
+    charge_ratio: ChargeRatio
+    azimuth: AzimuthScore
+    classifier: ClassifierScore
+    independence: Independence
+    unphysical: UnphysicalMuons
+    rate: RateScore | None
+    generated_spectra: Spectra
+    held_out_spectra: Spectra
+
+    def scores(self, architecture: str | None = None) -> tuple[Score, ...]:
+        """List the scores in short, judged by the targets of an architecture where it has any."""
+        return judge(scorecard(self), architecture)
+
+    def to_markdown(self, architecture: str | None = None) -> str:
+        """Write the scores in short as a Markdown table: value, noise, limit, verdict."""
+        return markdown_table(self.scores(architecture))
+
+    def to_json(self) -> str:
+        """Write everything as JSON."""
+        return to_json(self)
+
+    @classmethod
+    def from_json(cls, text: str) -> Evaluation:
+        """Read what `to_json` wrote."""
+        return from_json(cls, text)
+
+
+def evaluate(
+    generated: Muons | Iterable[Muons],
+    truth: Muons,
+    *,
+    seed: int,
+    muons_per_draw: int = 1,
+    raw_truth: Muons | None = None,
+    generated_rate: tuple[float, float] | None = None,
+    truth_rate: tuple[float, float] | None = None,
+    energy_range: tuple[float, float] = (1e-3, 1e5),
+    unphysical_before_mapping: float | None = None,
+) -> Evaluation:
+    """Compare generated muons with held-out ones.
+
+    All noise is that of independent muons. Where a draw is a correlated set (`muons_per_draw` above 1), the
+    counts of generated muons fluctuate otherwise, and `independence` says by how much.
+    CRY's own muons come in showers: held-out means of log E have a fifth more variance than stated.
+    Unphysical muons are counted, and left out of every other score.
+
+    Parameters
+    ----------
+    generated
+        The generated sequence, or its chunks, in the order in which it was made, beginning with a whole draw.
+    truth
+        Muons that trained nothing, of the distribution to be learned.
+    seed
+        Of the classifier and its choice of muons.
+    muons_per_draw
+        Muons that the generator makes together.
+    raw_truth
+        Held-out muons with the histogram steps still in, compared on CRY's cells only.
+    generated_rate, truth_rate
+        Rate and its standard uncertainty [Hz/m2], where known.
+    energy_range
+        Lowest and highest energy [GeV] that the generator may give.
+    unphysical_before_mapping
+        Fraction of unphysical muons before the generator's graph mapped them, where known.
+
+    Raises
+    ------
+    RefusedError
+        For fewer than 100,000 physical muons of either, or fewer than 100 draws.
+    """
+    everything = generated if isinstance(generated, Muons) else Muons.concatenate(list(generated) or [truth[:0]])
+    p = _physical(everything, energy_range, "generated")
+    q = _physical(truth, energy_range, "held-out")
+    p_counts, q_counts = count_muons(p), count_muons(q)
+    return Evaluation(
+        generated_muons=len(p),
+        held_out_muons=len(q),
+        muons_per_draw=muons_per_draw,
+        seed=seed,
+        ks={
+            "energy": kolmogorov_smirnov(p.kinetic_energy, q.kinetic_energy),
+            "u": kolmogorov_smirnov(p.u, q.u),
+            "v": kolmogorov_smirnov(p.v, q.v),
+            "cos zenith": kolmogorov_smirnov(p.cos_zenith, q.cos_zenith),
+        },
+        cells=compare_cells(p_counts, q_counts),
+        cells_against_raw=None if raw_truth is None else compare_cells(p_counts, count_muons(raw_truth)),
+        energy_bins=compare_energy_bins(p_counts, q_counts),
+        tails=compare_tails(p, q),
+        charge=compare_charge(p_counts, q_counts),
+        charge_ratio=compare_charge_ratio(p, q),
+        azimuth=compare_azimuth(p, q),
+        classifier=classify(p, q, seed=seed),
+        independence=measure_independence(p, muons_per_draw),
+        unphysical=count_unphysical(everything, energy_range, unphysical_before_mapping),
+        rate=compare_rate(generated_rate, truth_rate) if generated_rate and truth_rate else None,
+        generated_spectra=Spectra.of(p_counts),
+        held_out_spectra=Spectra.of(q_counts),
+    )
+
+
+def _physical(muons: Muons, energy_range: tuple[float, float], what: str) -> Muons:
+    """Leave out unphysical muons, or refuse if too few are left."""
+    physical = is_physical(muons, energy_range)
+    kept = int(np.count_nonzero(physical))
+    if kept < FEWEST_MUONS:
+        raise RefusedError(
+            f"{kept} physical {what} muons (of {len(muons)}) are too few to evaluate, need {FEWEST_MUONS}"
+        )
+    return muons if kept == len(muons) else muons[physical]
