@@ -1,0 +1,92 @@
+"""Power laws for the ends of the energy spectrum, where a training sample thins out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+__all__ = ["TAIL_MUONS", "PowerLawTails", "fit_power_law"]
+
+TAIL_MUONS = 1000
+"""Each tail is fitted to, and begins at, so many muons from the end of the training sample."""
+
+Float = NDArray[np.float64]
+
+
+def fit_power_law(values: Float, low: float, high: float) -> float:
+    """Exponent g of a survival function proportional to x^-g - high^-g on [low, high].
+
+    The maximum of the likelihood of a truncated Pareto distribution (I. B. Aban et al., J. Am. Stat. Assoc. 101
+    (2006) 270), which also allows g <= 0.
+
+    Parameters
+    ----------
+    values
+        Observed x, all within [low, high].
+    low, high
+        Ends of the range, positive.
+    """
+    mean_log = float(np.mean(np.log(values / low)))
+    span = np.log(high / low)
+
+    def excess(exponent: float) -> float:
+        """Return the expected mean of log(x / low), less the observed one."""
+        if abs(exponent * span) < 1e-6:
+            return float(span / 2 - mean_log)
+        return float(1 / exponent - span / np.expm1(exponent * span) - mean_log)
+
+    return float(brentq(excess, -50, 50))
+
+
+@dataclass(frozen=True)
+class PowerLawTails:
+    """The energy [GeV] of the muons nearest to both ends of the spectrum.
+
+    Parameters
+    ----------
+    level
+        Probability of each tail.
+    low, high
+        Energies where the tails begin.
+    low_exponent, high_exponent
+        F(E) goes as E^low_exponent - energy_min^low_exponent below `low`; the survival function as
+        E^-high_exponent - energy_max^-high_exponent above `high`.
+    energy_min, energy_max
+        The spectrum's ends.
+    """
+
+    level: float
+    low: float
+    high: float
+    low_exponent: float
+    high_exponent: float
+    energy_min: float
+    energy_max: float
+
+    @classmethod
+    def fit(cls, kinetic_energy: Float, *, energy_min: float, energy_max: float) -> PowerLawTails:
+        """Fit both tails to the `TAIL_MUONS` lowest and highest energies [GeV] of a sample."""
+        n = len(kinetic_energy)
+        ordered = np.partition(kinetic_energy, [TAIL_MUONS, n - TAIL_MUONS - 1])
+        low, high = float(ordered[TAIL_MUONS]), float(ordered[n - TAIL_MUONS - 1])
+        low_exponent = fit_power_law(1 / ordered[:TAIL_MUONS], 1 / low, 1 / energy_min)
+        high_exponent = fit_power_law(ordered[-TAIL_MUONS:], high, energy_max)
+        return cls(TAIL_MUONS / n, low, high, low_exponent, high_exponent, energy_min, energy_max)
+
+    def lowest(self, level: Float) -> Float:
+        """Quantile of the energy at a cumulative probability below `level`."""
+        return 1 / _quantile(level / self.level, 1 / self.low, 1 / self.energy_min, self.low_exponent)
+
+    def highest(self, level: Float) -> Float:
+        """Quantile of the energy at a survival probability below `level`."""
+        return _quantile(level / self.level, self.high, self.energy_max, self.high_exponent)
+
+
+def _quantile(survival: Float, low: float, high: float, exponent: float) -> Float:
+    """Where the survival function of a power law on [low, high] takes a value."""
+    ratio = (high / low) ** -exponent
+    quantile: Float = low * (ratio + survival * (1 - ratio)) ** (-1 / exponent)
+    return quantile
