@@ -1,0 +1,151 @@
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from scipy.special import expit, logit
+from scipy.stats import kstest
+
+from deepmuon_training import quantile_regression
+from deepmuon_training.monotone import ConditionalMonotoneMap, MonotoneMap
+from deepmuon_training.quantile_regression import RegressionSteps, regress, regress_conditional
+
+N = 100_000
+STEPS = RegressionSteps(adam=300, round=30, rounds=2)
+
+
+def mapped(network, *arguments) -> np.ndarray:
+    with torch.no_grad():
+        return copy.deepcopy(network).double()(*(torch.as_tensor(a, dtype=torch.float64) for a in arguments)).numpy()
+
+
+def test_the_map_takes_the_logit_of_the_level_to_the_quantile():
+    values = np.random.default_rng(1).gumbel(size=N)  # with quantiles -log(-log(level))
+    network = MonotoneMap(97, 12.0)
+    regress(network, values, tail=0.001)
+    level = np.linspace(0.001, 0.999, 1001)
+    found = mapped(network, logit(level))
+    moved = np.abs(np.exp(-np.exp(-found)) - level)
+    assert moved.max() < 1.95 / np.sqrt(N)  # the sample's own KS distance: more than that once in 1000
+
+
+def conditional_logistic(n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """A logistic distribution whose centre and width depend on the condition, uniform in (-1, 1)."""
+    random = np.random.default_rng(seed)
+    condition = 2 * random.random(n) - 1
+    values = centre(condition) + width(condition) * random.logistic(size=n)
+    return condition.astype(np.float32), values.astype(np.float32)
+
+
+def centre(condition):
+    return np.sin(3 * condition)
+
+
+def width(condition):
+    return 1 + 0.5 * condition
+
+
+def trained(steps, **options) -> tuple[ConditionalMonotoneMap, float]:
+    torch.manual_seed(1)
+    network = ConditionalMonotoneMap(units=33, reach=12.0, conditions=1, hidden=32)
+    loss = regress_conditional(
+        network, conditional_logistic(N, 1), conditional_logistic(N // 10, 2), steps, **{"progress": False, **options}
+    )
+    return network, loss
+
+
+def weights(network) -> torch.Tensor:
+    return torch.cat([parameter.detach().flatten() for parameter in network.parameters()])
+
+
+@pytest.fixture(scope="module")
+def conditional_and_loss() -> tuple[ConditionalMonotoneMap, float]:
+    return trained(STEPS)
+
+
+@pytest.fixture
+def conditional(conditional_and_loss) -> ConditionalMonotoneMap:
+    return conditional_and_loss[0]
+
+
+def test_the_conditional_map_makes_the_distribution_at_each_condition(conditional):
+    assert all(parameter.dtype == torch.float32 for parameter in conditional.parameters())
+    for condition in (-0.9, -0.3, 0.3, 0.9):
+        level = (np.arange(2000) + 0.5) / 2000
+        values = mapped(conditional, logit(level)[None], [[condition]])[0]
+        standard = (values - centre(condition)) / width(condition)
+        assert kstest(standard, expit).statistic < 0.02  # one of 180 bins has 560 muons: noise 0.037
+
+
+SHORT = RegressionSteps(adam=10, round=2, rounds=4)
+
+
+def test_the_regression_has_no_randomness_of_its_own():
+    assert torch.equal(*(weights(trained(SHORT)[0]) for _ in range(2)))
+
+
+def test_progress_changes_nothing(capfd):
+    shown, quiet = (trained(SHORT, progress=progress) for progress in (True, False))
+    assert torch.equal(weights(shown[0]), weights(quiet[0]))
+    assert shown[1] == quiet[1]
+    assert "4/4" in capfd.readouterr().err
+
+
+def losses(monkeypatch, values: list[float]) -> list[torch.Tensor]:
+    """Plan the validation losses; return the weights at each look."""
+    looks: list[torch.Tensor] = []
+
+    def planned(network, condition, observed):
+        looks.append(weights(network).float())
+        return values[len(looks) - 1]
+
+    monkeypatch.setattr(quantile_regression, "_validation_loss", planned)
+    return looks
+
+
+def test_it_stops_when_patience_ends_and_keeps_the_best_weights(monkeypatch):
+    looks = losses(monkeypatch, [3.0, 1.0, 2.0, 1.0, 0.5])
+    network, loss = trained(replace(SHORT, patience=2))
+    assert len(looks) == 4  # after Adam, and after three rounds
+    assert loss == 1.0
+    assert torch.equal(weights(network), looks[1])
+
+
+def test_it_stops_after_the_last_round_at_the_latest(monkeypatch):
+    looks = losses(monkeypatch, [5.0, 4.0, 3.0, 2.0, 1.0, 0.0])
+    network, loss = trained(SHORT)
+    assert len(looks) == 5
+    assert loss == 1.0
+    assert torch.equal(weights(network), looks[4])
+
+
+def test_the_validation_loss_is_the_pinball_loss_over_all_levels(conditional_and_loss):
+    # That is half the continuous ranked probability score, E|X - Y| - E|X - X'| / 2 = width of a logistic distribution.
+    mean_width = 1.0
+    assert conditional_and_loss[1] == pytest.approx(mean_width / 2, rel=0.03)  # 10,000 muons: noise 0.01
+
+
+def test_the_weights_with_the_smallest_pinball_loss_of_the_validation_muons_are_kept():
+    torch.manual_seed(1)
+    network = ConditionalMonotoneMap(units=9, reach=12.0, conditions=1, hidden=8)
+    before = copy.deepcopy(network.state_dict())
+    condition, values = conditional_logistic(20_000, 4)
+    predicted = mapped(network, np.zeros((1, 1)), [[0.0]])
+    constant = condition, np.full_like(values, predicted.item())  # nothing could be nearer than the first weights are
+    far = condition, values + np.float32(100)
+    steps = RegressionSteps(adam=0, round=5, rounds=9, patience=2)
+    assert regress_conditional(network, far, constant, steps, progress=False) < 1
+    for name, value in network.state_dict().items():
+        torch.testing.assert_close(value, before[name])
+
+
+def test_a_heavy_end_of_the_condition_does_not_break_the_bins():
+    condition, values = conditional_logistic(20_000, 2)
+    condition = np.clip(condition, -0.5, 0.5)  # half of the sample shares two conditions
+    network = ConditionalMonotoneMap(units=9, reach=12.0, conditions=1, hidden=8)
+    sample = condition, values
+    regress_conditional(network, sample, sample, RegressionSteps(adam=20, round=5, rounds=1), progress=False)
+    assert np.all(np.isfinite(mapped(network, np.zeros((3, 1)), [[-0.5], [0.0], [0.5]])))

@@ -1,0 +1,95 @@
+"""Trains the `quantile` generator: charge, energy and zenith, one after the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from deepmuon_runtime.muons import Muons
+from deepmuon_training.charge import CHARGE_SCHEDULE, fit_charge
+from deepmuon_training.fit import Schedule
+from deepmuon_training.power_law import PowerLawTails
+from deepmuon_training.preprocessing import EnergyTransform
+from deepmuon_training.quantile import QuantileGenerator
+from deepmuon_training.quantile_regression import RegressionSteps, regress, regress_conditional
+from deepmuon_training.sample import MINIMUM_ENERGY
+from deepmuon_training.validation import split
+
+__all__ = ["ENERGY_MAX", "QuantileSchedules", "fit_quantile"]
+
+ENERGY_MAX = 1e5
+"""Where the power law of the spectrum ends [GeV]."""
+
+
+@dataclass(frozen=True)
+class QuantileSchedules:
+    """How the networks are trained; the default made the released models.
+
+    Parameters
+    ----------
+    zenith
+        Of the zenith map.
+    charge
+        Of the charge's probability.
+    """
+
+    zenith: RegressionSteps = RegressionSteps()
+    charge: Schedule = CHARGE_SCHEDULE
+
+
+def fit_quantile(
+    muons: Muons,
+    *,
+    seed: int,
+    schedules: QuantileSchedules | None = None,
+    checkpoint: Path | None = None,
+    progress: bool = True,
+) -> QuantileGenerator:
+    """Train a generator on muons, the last twentieth of which validates.
+
+    Parameters
+    ----------
+    muons
+        Independent muons in no particular order.
+    seed
+        Of weights and batches.
+    schedules
+        Steps and rates.
+    checkpoint
+        Of the charge's fit, as in `deepmuon_training.fit.fit`; the other steps take a minute or two and start anew.
+    progress
+        Whether to show progress bars.
+    """
+    schedules = schedules or QuantileSchedules()
+    energy = muons.kinetic_energy.astype(np.float64)
+    transform = EnergyTransform.fit(muons.kinetic_energy)
+
+    charge = fit_charge(
+        muons,
+        transform,
+        seed=seed,
+        schedule=schedules.charge,
+        checkpoint=checkpoint,
+        progress=progress,
+    )
+    tails = PowerLawTails.fit(energy, energy_min=MINIMUM_ENERGY, energy_max=ENERGY_MAX)
+    torch.manual_seed(seed)
+    generator = QuantileGenerator(transform, tails, charge)
+    y = transform.pre_tanh(energy)
+    regress(generator.energy, y, tails.level)
+    condition = generator.condition(torch.from_numpy(y.astype(np.float32))).numpy()
+    parts = split(condition, _cos_zenith_logit(muons))
+    regress_conditional(generator.zenith, *parts, schedules.zenith, progress=progress)
+    generator.join_tails()
+    return generator
+
+
+def _cos_zenith_logit(muons: Muons) -> NDArray[np.float32]:
+    """Logit of cos zenith; 1 - cos zenith comes from the horizontal components, without a cancellation."""
+    c = np.clip(muons.cos_zenith.astype(np.float64), 1e-6, 1)
+    sine_squared = np.maximum(muons.u.astype(np.float64) ** 2 + muons.v.astype(np.float64) ** 2, 1e-12)
+    return np.log(c * (1 + c) / sine_squared).astype(np.float32)

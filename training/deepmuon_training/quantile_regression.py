@@ -1,0 +1,168 @@
+"""Regression of monotone maps on empirical quantile functions.
+
+The squared difference of two quantile functions, integrated over the level, is the squared Wasserstein distance of
+their distributions in one dimension. Each difference is weighted by the inverse variance of the empirical quantile,
+n u (1 - u) / s'^2 with n muons, level u and slope s' over the level's logit (R. Koenker, "Quantile regression",
+Cambridge 2005, section 4.2). When to stop, the pinball loss of other muons says, one by one and at all levels.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.special import expit, logit
+from tqdm import tqdm
+
+from deepmuon_training.monotone import ConditionalMonotoneMap, MonotoneMap
+from deepmuon_training.pinball import pinball_loss
+
+__all__ = ["RegressionSteps", "regress", "regress_conditional"]
+
+_POINTS, _SLOPE_POINTS = 4001, 81
+_LEVELS = np.linspace(-11, 11, 89)  # logit of the levels at which conditional quantiles are compared
+_BINS = np.arange(-9, 9.05, 0.1)  # logit of the condition's levels that bound its bins
+_FEWEST_IN_BIN, _FEWEST_BEYOND = 50, 5
+_FLATTEST = 0.05
+_LEVELS_OF_MUON = 4
+_GOLDEN = (np.sqrt(5) - 1) / 2  # its multiples are spread evenly over (0, 1)
+
+Float = NDArray[np.float64]
+
+
+def regress(network: MonotoneMap, values: Float, tail: float) -> None:
+    """Fit a map without condition to values [n], at levels between `tail` and 1 - `tail`; exact, see `solve`."""
+    edge = logit(1 - tail)
+    level = np.linspace(-edge, edge, _POINTS)
+    quantiles = np.quantile(values, expit(level))
+    coarse = np.linspace(-edge, edge, _SLOPE_POINTS)
+    slope = np.interp(level, coarse, np.gradient(np.interp(coarse, level, quantiles), coarse))
+    network.solve(level, quantiles, np.sqrt(expit(level) * expit(-level)) / slope)
+
+
+@dataclass(frozen=True)
+class RegressionSteps:
+    """How long a conditional map is fitted.
+
+    Parameters
+    ----------
+    adam
+        Steps of Adam, which finds the neighbourhood of the solution.
+    round
+        Steps of L-BFGS between two looks at the validation loss.
+    rounds
+        How many such rounds at most.
+    patience
+        Stop after so many rounds without a smaller loss.
+    """
+
+    adam: int = 1500
+    round: int = 500
+    rounds: int = 16
+    patience: int = 6
+
+
+def regress_conditional(
+    network: ConditionalMonotoneMap,
+    training: Sequence[NDArray[np.float32]],
+    validation: Sequence[NDArray[np.float32]],
+    steps: RegressionSteps,
+    *,
+    progress: bool = True,
+) -> float:
+    """Fit a conditional map to the quantiles of values in some 180 bins of their condition.
+
+    The bins are even in the logit of the condition's level, so that the sparse ends are resolved too. Adam is followed
+    by L-BFGS (D. C. Liu and J. Nocedal, Math. Program. 45 (1989) 503), in double precision. The network is left
+    with the weights of the smallest pinball loss of the validation muons.
+
+    Parameters
+    ----------
+    network
+        Trained in place.
+    training, validation
+        Condition [n] and values [n].
+    steps
+        How long.
+    progress
+        Whether to show rounds, validation loss and time left on stderr.
+
+    Returns
+    -------
+    float
+        The smallest pinball loss.
+    """
+    points, quantiles, weights = (torch.from_numpy(part) for part in _binned_quantiles(*training))
+    points = points.unsqueeze(-1)
+    levels = torch.from_numpy(_LEVELS).expand(len(points), -1)
+    network.double()
+
+    def loss() -> torch.Tensor:
+        difference: torch.Tensor = network(levels, points) - quantiles
+        return (weights * difference**2).mean()
+
+    adam = torch.optim.Adam(network.parameters(), lr=0.01)
+    fall = torch.optim.lr_scheduler.CosineAnnealingLR(adam, steps.adam)
+    for _ in tqdm(range(steps.adam), desc="zenith, Adam", disable=not progress, unit="step", mininterval=1):
+        _backward(adam, loss)
+        adam.step()
+        fall.step()
+    lbfgs = torch.optim.LBFGS(
+        network.parameters(),
+        max_iter=steps.round,
+        history_size=50,
+        tolerance_grad=0,
+        tolerance_change=0,
+        line_search_fn="strong_wolfe",
+    )
+    best, best_weights, misses = _validation_loss(network, *validation), copy.deepcopy(network.state_dict()), 0
+    with tqdm(range(steps.rounds), desc="zenith, L-BFGS", disable=not progress, unit="round") as bar:
+        for _ in bar:
+            lbfgs.step(lambda: _backward(lbfgs, loss))  # type: ignore[no-untyped-call]
+            found, misses = _validation_loss(network, *validation), misses + 1
+            if found < best:
+                best, best_weights, misses = found, copy.deepcopy(network.state_dict()), 0
+            bar.set_postfix(pinball=f"{found:.7g}", best=f"{best:.7g}", refresh=False)
+            if misses == steps.patience:
+                break
+    network.load_state_dict(best_weights)
+    network.float()
+    return best
+
+
+def _validation_loss(
+    network: ConditionalMonotoneMap, condition: NDArray[np.float32], values: NDArray[np.float32]
+) -> float:
+    """Pinball loss of muons one by one, each at a few levels that together cover (0, 1) evenly."""
+    level = (np.arange(len(values))[:, None] * _GOLDEN + np.arange(_LEVELS_OF_MUON) / _LEVELS_OF_MUON) % 1
+    level = torch.from_numpy(np.clip(level, 1e-6, 1 - 1e-6))
+    with torch.no_grad():
+        predicted = network(torch.logit(level), torch.from_numpy(condition).double().unsqueeze(-1))
+    return float(pinball_loss(predicted, torch.from_numpy(values).double().unsqueeze(-1), level))
+
+
+def _backward(optimizer: torch.optim.Optimizer, loss: Callable[[], torch.Tensor]) -> float:
+    optimizer.zero_grad()
+    value = loss()
+    value.backward()  # type: ignore[no-untyped-call]
+    return float(value.detach())
+
+
+def _binned_quantiles(condition: NDArray[np.float32], values: NDArray[np.float32]) -> tuple[Float, Float, Float]:
+    """Return the bins' mean condition [bins], and quantiles and weights at the levels [bins, levels]."""
+    order = np.argsort(condition)
+    condition, values = condition[order].astype(np.float64), values[order].astype(np.float64)
+    edges = np.round(len(values) * np.concatenate([[0], expit(_BINS), [1]])).astype(int)
+    rows = [slice(a, b) for a, b in pairwise(edges) if b - a >= _FEWEST_IN_BIN]
+    level = expit(_LEVELS)
+    quantiles = np.array([np.quantile(values[row], level) for row in rows])
+    number = np.array([[row.stop - row.start] for row in rows])
+    slope = np.maximum(np.gradient(quantiles, _LEVELS, axis=1), _FLATTEST)
+    weights = number * level * (1 - level) / slope**2
+    weights[number * np.minimum(level, 1 - level) < _FEWEST_BEYOND] = 0
+    return np.array([condition[row].mean() for row in rows]), quantiles, weights / weights.mean()
