@@ -1,0 +1,120 @@
+"""Trains the `transformer` generator with the sliced Wasserstein loss."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import nn
+
+from deepmuon_runtime.muons import Muons
+from deepmuon_training.fit import Schedule, fit
+from deepmuon_training.preprocessing import EnergyTransform
+from deepmuon_training.sliced_wasserstein import deepmuon_loss, random_directions, sliced_wasserstein
+from deepmuon_training.transformer import LATENTS, Transformer
+from deepmuon_training.validation import VALIDATION_FRACTION
+
+__all__ = ["TransformerSettings", "features", "fit_transformer"]
+
+_VALIDATION_DIRECTIONS = 64
+_LARGEST_COSINE = 1 - 1e-6
+
+
+@dataclass(frozen=True)
+class TransformerSettings:
+    """Size and training; the default made the released models.
+
+    Parameters
+    ----------
+    d
+        Width of the network; 1024 in the paper.
+    batch
+        Muons in a batch, a multiple of d; 307,200 in the paper.
+    directions
+        Random projections a step; 2048 in the paper.
+    schedule
+        Steps and rates.
+    """
+
+    d: int = 128
+    batch: int = 32768
+    directions: int = 32
+    schedule: Schedule = Schedule(
+        steps=6000, learning_rate=1e-3, weight_decay=0.01, averaging=0.998, validate_every=250, patience=16
+    )
+
+
+def features(muons: Muons, transform: EnergyTransform) -> torch.Tensor:
+    """Return the pre-tanh values [n, 3] of muons: x - mean of the energy, atanh cos x, atanh cos y."""
+    cosines = [np.arctanh(np.clip(column, -_LARGEST_COSINE, _LARGEST_COSINE)) for column in (muons.u, muons.v)]
+    columns = [transform.pre_tanh(muons.kinetic_energy), *cosines]
+    return torch.from_numpy(np.stack([column.astype(np.float32) for column in columns], axis=1))
+
+
+def fit_transformer(
+    muons: Muons,
+    *,
+    seed: int,
+    settings: TransformerSettings | None = None,
+    checkpoint: Path | None = None,
+    device: str = "cpu",
+    progress: bool = True,
+) -> tuple[Transformer, EnergyTransform]:
+    """Train a network on muons, the last twentieth of which validates.
+
+    Parameters
+    ----------
+    muons
+        In no particular order.
+    seed
+        Of weights and batches.
+    settings
+        Size and training.
+    checkpoint
+        File to save to and, where it exists, to go on from.
+    device
+        "cpu" or "cuda".
+    progress
+        Whether to show a progress bar.
+    """
+    settings = settings or TransformerSettings()
+    torch.manual_seed(seed)
+    transform = EnergyTransform.fit(muons.kinetic_energy)
+    network = Transformer(settings.d).to(device)
+    truth = features(muons, transform).to(device)
+    held = len(truth) - round(len(truth) * (1 - VALIDATION_FRACTION))
+    training, validation = truth[:-held], truth[-held:]
+    draws = settings.batch // settings.d
+
+    def loss(network: nn.Module, random: torch.Generator) -> torch.Tensor:
+        latent = 2 * torch.rand(draws, LATENTS, generator=random) - 1
+        rows = torch.randint(len(training), (draws * settings.d,), generator=random)
+        directions = random_directions(settings.directions, 3, random).to(device)
+        return deepmuon_loss(as_rows(network(latent.to(device))), training[rows.to(device)], directions)
+
+    fixed = torch.Generator().manual_seed(seed + 1)
+    validation_latent = (2 * torch.rand(-(-held // settings.d), LATENTS, generator=fixed) - 1).to(device)
+    validation_directions = random_directions(_VALIDATION_DIRECTIONS, 3, fixed).to(device)
+
+    def distance(network: nn.Module) -> float:
+        generated = as_rows(network(validation_latent))[:held]
+        return float(sliced_wasserstein(generated, validation, validation_directions))
+
+    fit(
+        network,
+        loss,
+        distance,
+        settings.schedule,
+        seed=seed,
+        name="transformer",
+        checkpoint=checkpoint,
+        progress=progress,
+    )
+    return network.cpu(), transform
+
+
+def as_rows(values: torch.Tensor) -> torch.Tensor:
+    """Reshape [draws, 3, d] to one row a muon [draws d, 3]."""
+    return values.transpose(1, 2).reshape(-1, 3)
