@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ def model_file(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def released(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def released(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder on Python's path with a package of small released models, in place of the real one."""
     folder = tmp_path / "released"
     release(
@@ -29,4 +30,5 @@ def released(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     )
     monkeypatch.delitem(sys.modules, "deepmuon_models", raising=False)
     monkeypatch.syspath_prepend(folder)
-    return folder
+    yield folder
+    sys.modules.pop("deepmuon_models", None)  # whoever comes next shall find the real one

@@ -57,7 +57,7 @@ def smoothed(stepped):
 
 @pytest.mark.parametrize("column", ["kinetic_energy", "cos_zenith", "u"])
 def test_a_known_smooth_flux_comes_back_within_the_noise(truth, smoothed, column):
-    # The smoothed muons have the truth's cell contents: their distance should even be below that of independent samples.
+    # They have the truth's cell contents, so their distance should even be below that of independent samples.
     assert distance(smoothed, truth, column) < NOISE
 
 

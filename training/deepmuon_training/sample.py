@@ -154,8 +154,9 @@ def read_cry(path: str | Path, part: slice = slice(None)) -> Sample:
             relative = np.sqrt(CRY_SHOWER_VARIANCE / len(group["kinetic_energy"]))
             source = str(group.attrs["source"])
     except (OSError, KeyError, ValueError, TypeError) as error:  # no HDF5, no such column, /muons is no group
+        reason = " ".join(str(error).split())
         raise RefusedError(
-            f"{path} is no CRY sample (HDF5, /muons with energy, direction and charge): {error}"
+            f"{path} is no CRY sample (HDF5, /muons with energy, direction and charge): {reason}"
         ) from error
     everything = Muons(energy, u, v, w, pdg_id)
     kept = energy >= MINIMUM_ENERGY

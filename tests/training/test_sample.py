@@ -1,0 +1,160 @@
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.muon_file import read_attributes
+from deepmuon_runtime.muons import Muons
+from deepmuon_training.sample import (
+    CRY_SHOWER_VARIANCE,
+    HELD_OUT_CRY_MUONS,
+    Sample,
+    read_cry,
+    read_sample,
+    write_sample,
+)
+
+MUONS = Muons.of([1.0, 0.002, 300.0], [0.0, 0.6, 0.0], [0.0, 0.0, -0.6], [-1.0, -0.8, -0.8], [13, -13, 13])
+
+CRY = {
+    "kinetic_energy": np.float32([1000.0, 0.5, 2.0, 3e6, 0.999, 1.0]),  # MeV
+    "u": np.float32([0, 0.6, 0, 0, 0.6, 0]),
+    "v": np.float32([0, 0, 0.6, 0, 0, 0.6]),
+    "w": np.float32([-1, -0.8, -0.8, -1, -0.8, -0.8]),
+    "charge": np.int8([1, 1, -1, -1, -1, 1]),
+}
+
+
+def assert_same(found: Sample, expected: Sample) -> None:
+    for field in fields(Sample):
+        if field.name != "muons":
+            assert getattr(found, field.name) == getattr(expected, field.name), field.name
+    for field in fields(Muons):
+        np.testing.assert_array_equal(getattr(found.muons, field.name), getattr(expected.muons, field.name))
+
+
+@pytest.fixture
+def cry(tmp_path: Path) -> Path:
+    path = tmp_path / "cry.h5"
+    with h5py.File(path, "w") as file:
+        group = file.create_group("muons")
+        group.attrs["rate_hz_per_m2"], group.attrs["source"] = 120.0, "CRY 1.7"
+        for name, column in CRY.items():
+            group[name] = column
+    return path
+
+
+@pytest.mark.parametrize(
+    "known",
+    [
+        {},
+        {"provenance": ("made", "changed"), "medium": "G4_CONCRETE", "rate": 60.5, "rate_uncertainty": 0.2},
+        {"smoothed": True},
+        {"smoothed": False, "rate": 1.5},
+    ],
+)
+def test_a_sample_comes_back_as_it_was_written(tmp_path, known):
+    sample = Sample(MUONS, depth_m=10.0, source="the tests", **known)
+    write_sample(tmp_path / "sample.h5", sample)
+    assert_same(read_sample(tmp_path / "sample.h5"), sample)
+
+
+def test_what_is_unknown_is_left_out_of_the_file(tmp_path):
+    write_sample(tmp_path / "sample.h5", Sample(MUONS, depth_m=10.0, source="the tests"))
+    attributes = read_attributes(tmp_path / "sample.h5")
+    assert {"rate_hz_per_m2", "rate_uncertainty_hz_per_m2", "smoothed", "live_time_s_m2"}.isdisjoint(attributes)
+    assert attributes["count"] == 3
+
+
+def test_a_sample_is_not_overwritten_unless_asked_for(tmp_path):
+    path = tmp_path / "sample.h5"
+    write_sample(path, Sample(MUONS, depth_m=10.0, source="first"))
+    with pytest.raises(RefusedError, match="exists already"):
+        write_sample(path, Sample(MUONS, depth_m=10.0, source="second"))
+    write_sample(path, Sample(MUONS, depth_m=10.0, source="third"), overwrite=True)
+    assert read_sample(path).source == "third"
+
+
+def test_a_change_is_added_to_the_provenance():
+    first = Sample(MUONS, depth_m=0.0, source="the tests", provenance=("made",), rate=100.0)
+    second = first.then("halved", rate=50.0)
+    assert (second.provenance, second.rate, second.muons) == (("made", "halved"), 50.0, MUONS)
+    assert first.provenance == ("made",)
+    assert len(second) == 3
+
+
+def test_cry_is_read_in_gev_with_pdg_ids_and_without_muons_below_1_mev(cry):
+    sample = read_cry(cry)
+    np.testing.assert_allclose(sample.muons.kinetic_energy, [1.0, 2e-3, 3e3, 1e-3], rtol=1e-6)
+    assert sample.muons.kinetic_energy.dtype == np.float32
+    assert sample.muons.kinetic_energy.min() >= 1e-3
+    np.testing.assert_array_equal(sample.muons.pdg_id, [-13, 13, 13, -13])
+    np.testing.assert_array_equal(sample.muons.v, np.float32([0, 0.6, 0, 0.6]))
+    assert (sample.depth_m, sample.source, sample.smoothed) == (0.0, "CRY 1.7", False)
+    assert sample.provenance == ("CRY 1.7, rows 0 to 6, 2 below 1 MeV dropped",)
+
+
+def test_crys_rate_is_that_of_the_muons_kept_and_knows_of_showers(cry):
+    sample = read_cry(cry)
+    assert sample.rate == pytest.approx(120.0 * 4 / 6)
+    assert sample.rate_uncertainty == pytest.approx(120.0 * np.sqrt(CRY_SHOWER_VARIANCE / 6))
+
+
+def test_training_and_held_out_rows_are_all_rows(cry):
+    training, held_out = read_cry(cry, slice(-2)), read_cry(cry, slice(-2, None))
+    both = Muons.concatenate([training.muons, held_out.muons])
+    np.testing.assert_array_equal(both.kinetic_energy, read_cry(cry).muons.kinetic_energy)
+    assert held_out.provenance == ("CRY 1.7, rows 4 to 6, 1 below 1 MeV dropped",)
+    assert held_out.rate == pytest.approx(60.0)
+    assert HELD_OUT_CRY_MUONS == 2_000_000
+
+
+def test_rows_without_a_muon_are_refused(cry):
+    with pytest.raises(RefusedError, match="no muon of at least 1 MeV in its rows 0 to 0"):
+        read_cry(cry, slice(-HELD_OUT_CRY_MUONS))
+
+
+def without(path: Path, name: str) -> None:
+    with h5py.File(path, "r+") as file:
+        del file["muons"][name]
+
+
+@pytest.mark.parametrize("column", CRY)
+def test_a_cry_file_that_lacks_a_column_is_refused(cry, column):
+    without(cry, column)
+    with pytest.raises(RefusedError, match="is no CRY sample"):
+        read_cry(cry)
+
+
+def wrong_files(folder: Path) -> dict[str, Path]:
+    paths = {name: folder / name for name in ("missing", "text", "empty", "column", "folder")}
+    paths["text"].write_text("muons")
+    paths["folder"].mkdir()
+    with h5py.File(paths["empty"], "w"):
+        pass
+    with h5py.File(paths["column"], "w") as file:
+        file["muons"] = np.zeros(3)
+    return paths
+
+
+@pytest.mark.parametrize("kind", ["missing", "text", "empty", "column", "folder"])
+@pytest.mark.parametrize("read", [read_cry, read_sample])
+def test_a_file_of_another_kind_is_refused_in_one_line(tmp_path, read, kind):
+    path = wrong_files(tmp_path)[kind]
+    with pytest.raises(RefusedError) as refusal:
+        read(path)
+    assert str(path) in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_crys_file_and_the_contracts_are_not_mistaken_for_each_other(cry, tmp_path):
+    write_sample(tmp_path / "sample.h5", Sample(MUONS, depth_m=0.0, source="the tests"))
+    with pytest.raises(RefusedError, match="is no CRY sample"):
+        read_cry(tmp_path / "sample.h5")
+    with pytest.raises(RefusedError, match="is no muon file"):
+        read_sample(cry)

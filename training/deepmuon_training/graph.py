@@ -1,0 +1,89 @@
+"""Writes ONNX graphs node by node."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import onnx
+from numpy.typing import NDArray
+from onnx import TensorProto, helper, numpy_helper
+
+__all__ = ["IR_VERSION", "OPSET", "Graph"]
+
+OPSET = 20
+"""The newest operator set that ONNX Runtime 1.17 reads."""
+
+IR_VERSION = 9
+"""Likewise, of the file format."""
+
+
+class Graph:
+    """A graph under construction; a value is known by its name, a string.
+
+    Calling the graph adds a node: ``y = graph("Mul", x, 2.0)``. Numbers and arrays become constants, numbers as
+    float32. Names are counted, so that the same calls give the same bytes.
+    """
+
+    def __init__(self) -> None:
+        self._nodes: list[onnx.NodeProto] = []
+        self._constants: dict[tuple[str, tuple[int, ...], bytes], str] = {}
+        self._initializers: list[onnx.TensorProto] = []
+
+    def __call__(self, operator: str, *inputs: str | float | NDArray[Any], **attributes: Any) -> str:
+        """Add a node of one output and return the output's name."""
+        return self.several(operator, 1, *inputs, **attributes)[0]
+
+    def several(self, operator: str, outputs: int, *inputs: str | float | NDArray[Any], **attributes: Any) -> list[str]:
+        """Add a node of several outputs and return their names."""
+        names = [f"{operator}_{len(self._nodes)}" + (f"_{k}" if outputs > 1 else "") for k in range(outputs)]
+        sources = [value if isinstance(value, str) else self.constant(value) for value in inputs]
+        self._nodes.append(helper.make_node(operator, sources, names, **attributes))
+        return names
+
+    def constant(self, value: float | NDArray[Any]) -> str:
+        """Return the name of a constant; equal ones are stored once."""
+        array = np.asarray(value, dtype=np.float32) if isinstance(value, float | int) else np.asarray(value)
+        key = array.dtype.str, array.shape, array.tobytes()
+        if key not in self._constants:
+            self._constants[key] = f"constant_{len(self._constants)}"
+            self._initializers.append(numpy_helper.from_array(array, self._constants[key]))
+        return self._constants[key]
+
+    def model(
+        self,
+        inputs: Mapping[str, list[str | int]],
+        outputs: Mapping[str, tuple[str, int, list[str | int]]],
+        metadata: Mapping[str, str],
+    ) -> onnx.ModelProto:
+        """Finish the graph and return it as a checked model.
+
+        Parameters
+        ----------
+        inputs
+            Shape of each float32 input, by name.
+        outputs
+            For each output, by name: the value it takes, its element type and its shape.
+        metadata
+            Written as metadata_props, in order.
+
+        Raises
+        ------
+        onnx.checker.ValidationError, onnx.shape_inference.InferenceError
+            If it is no valid model, or its types and shapes do not fit together.
+        """
+        for name, (value, _, _) in outputs.items():
+            self._nodes.append(helper.make_node("Identity", [value], [name]))
+        graph = helper.make_graph(
+            self._nodes,
+            "deepmuon",
+            [helper.make_tensor_value_info(name, TensorProto.FLOAT, shape) for name, shape in inputs.items()],
+            [helper.make_tensor_value_info(name, kind, shape) for name, (_, kind, shape) in outputs.items()],
+            self._initializers,
+        )
+        model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
+        model.producer_name = "deepmuon"
+        helper.set_model_props(model, dict(metadata))
+        onnx.checker.check_model(model, full_check=True)
+        return model
