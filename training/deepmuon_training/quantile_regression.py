@@ -63,8 +63,8 @@ class RegressionSteps:
 
     adam: int = 1500
     round: int = 500
-    rounds: int = 16
-    patience: int = 6
+    rounds: int = 20
+    patience: int = 12
 
 
 def regress_conditional(

@@ -1,0 +1,41 @@
+"""How Sphinx builds the site: ``sphinx-build -W docs docs/_build``. Nothing is downloaded, then or while reading."""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import version as version_of
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
+
+project = "DeepMuon"
+author = "The DeepMuon developers"
+copyright = f"2025, {author}"
+release = version = version_of("deepmuon-runtime")
+
+extensions = [
+    "include_all",
+    "mathml",
+    "myst_parser",
+    "released_models",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_click",
+]
+exclude_patterns = ["_build", "measured.md"]
+default_role = "py:obj"  # `name` in a docstring is Python's
+smartquotes = False  # options have two dashes
+
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_default_options = {"members": True}
+napoleon_google_docstring = False
+
+html_theme = "furo"
+html_title = f"DeepMuon {version}"
+html_math_renderer = "mathml"
+html_copy_source = False
+html_show_sphinx = False

@@ -1,0 +1,98 @@
+"""Draws the pictures of the docs: ``DEEPMUON_CRY=cry_sea_level.h5 python docs/make_images.py``.
+
+The one on the first page is of freshly generated muons. The one of the smoothing is of CRY's held-out muons, and is
+drawn only where the environment variable names their file.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from deepmuon_runtime import Generator, Muons
+from deepmuon_training.sample import HELD_OUT_CRY_MUONS, read_cry
+from deepmuon_training.smoothing import StepSmoother
+from deepmuon_training.smoothing_plot import draw_smoothing
+
+IMAGES = Path(__file__).parent / "images"
+MUONS = 10_000_000
+SEED = 1
+COLOURS = {0: "#d1495b", 10: "#00638a"}  # by depth in metres
+NAMES = {0: "sea level", 10: "under 10 m of water"}
+ENERGY_EDGES = np.geomspace(2e-3, 2e3, 121)
+ZENITH_EDGES = np.linspace(0, 90, 91)
+
+STYLE = {
+    "font.size": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#444444",
+    "axes.grid": True,
+    "grid.color": "#e6e6e6",
+    "axes.axisbelow": True,
+    "figure.facecolor": "white",
+}
+
+Float = NDArray[np.float64]
+
+
+def main() -> None:
+    """Draw into docs/images."""
+    IMAGES.mkdir(exist_ok=True)
+    draw_generated(IMAGES / "muons.png")
+    if "DEEPMUON_CRY" in os.environ:
+        draw_smoothed(os.environ["DEEPMUON_CRY"], IMAGES / "smoothing.png")
+
+
+def draw_smoothed(cry: str, path: Path) -> None:
+    """Draw what taking CRY's steps out changes and keeps."""
+    smooth = StepSmoother(read_cry(cry, slice(-HELD_OUT_CRY_MUONS)).muons)
+    raw = read_cry(cry, slice(-HELD_OUT_CRY_MUONS, None)).muons
+    draw_smoothing(raw, smooth(raw)).savefig(path, dpi=110)
+
+
+def draw_generated(path: Path) -> None:
+    """Draw energies and zenith angles of the released models."""
+    with plt.rc_context(STYLE):
+        figure, (energy, zenith) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+        for depth in COLOURS:
+            generator = Generator.open(depth)
+            muons = generator.sample(MUONS, seed=SEED)
+            rate = generator.model.rate_hz_per_m2 or 1.0
+            draw(energy, depth, ENERGY_EDGES, energy_spectrum(muons, rate))
+            draw(zenith, depth, ZENITH_EDGES, zenith_distribution(muons, rate))
+        energy.set(xscale="log", yscale="log", ylim=(3e-4, 60))
+        energy.set(xlabel="kinetic energy / GeV", ylabel=r"$E\,\mathrm{d}\Phi/\mathrm{d}E$  /  m$^{-2}$ s$^{-1}$")
+        zenith.set(xlim=(0, 90), xticks=range(0, 91, 15), ylim=(0, None))
+        zenith.set(
+            xlabel="zenith angle / °", ylabel=r"$\mathrm{d}\Phi/\mathrm{d}\theta$  /  m$^{-2}$ s$^{-1}$ per degree"
+        )
+        zenith.legend(frameon=False)
+        figure.savefig(path, dpi=130)
+
+
+def energy_spectrum(muons: Muons, rate: float) -> Float:
+    """Flux through a horizontal plane per unit of log energy [1/(m2 s)]."""
+    counts = np.histogram(muons.kinetic_energy, ENERGY_EDGES)[0]
+    return counts * (rate / len(muons)) / np.diff(np.log(ENERGY_EDGES))
+
+
+def zenith_distribution(muons: Muons, rate: float) -> Float:
+    """Flux through a horizontal plane per degree of zenith angle [1/(m2 s)]."""
+    zenith = np.degrees(np.arctan2(np.hypot(muons.u, muons.v), muons.cos_zenith))
+    return np.histogram(zenith, ZENITH_EDGES)[0] * (rate / len(muons)) / np.diff(ZENITH_EDGES)
+
+
+def draw(axes: Axes, depth: int, edges: Float, values: Float) -> None:
+    """Draw one distribution as a filled step line."""
+    axes.stairs(values, edges, baseline=None, color=COLOURS[depth], linewidth=1.6, label=NAMES[depth])
+    axes.stairs(values, edges, fill=True, color=COLOURS[depth], alpha=0.1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,209 @@
+"""Makes the released models again, from CRY's muons to ONNX files, cards and manifest.
+
+    python models/make.py --cry cry_sea_level.h5 --work work
+
+Steps whose result lies in the work folder are not repeated, and an interrupted fit goes on from its checkpoint.
+On two free cores: 5 minutes to carry the muons through water, 15 for each `quantile` and 25 for each `transformer`
+model, 4 to evaluate one.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import click
+import numpy as np
+import torch
+
+from deepmuon_runtime import Generator
+from deepmuon_training.card import card, manifest_entry
+from deepmuon_training.charge import fit_charge
+from deepmuon_training.evaluate import evaluate
+from deepmuon_training.export import Exportable, Training, export
+from deepmuon_training.plots import draw_pictures
+from deepmuon_training.preprocessing import box_cox
+from deepmuon_training.quantile import QuantileGenerator
+from deepmuon_training.quantile_fit import ENERGY_MAX, fit_quantile
+from deepmuon_training.quantile_tables import table_error, tabulate
+from deepmuon_training.sample import (
+    HELD_OUT_CRY_MUONS,
+    MINIMUM_ENERGY,
+    Sample,
+    read_cry,
+    read_sample,
+    write_sample,
+)
+from deepmuon_training.smoothing import StepSmoother
+from deepmuon_training.transformer_fit import fit_transformer
+from deepmuon_training.transformer_model import ChargeTable, TransformerModel, radius_table, raw_muons
+from deepmuon_training.transport import transport
+
+REPOSITORY = Path(__file__).parents[1]
+RELEASED = REPOSITORY / "models" / "deepmuon_models"
+EVALUATIONS = REPOSITORY / "docs" / "evaluations"
+SEED = 1
+EVALUATED_MUONS = 20_000_000
+LAYER = 10
+"""Metres of water between two depths."""
+
+
+class Made(NamedTuple):
+    """A generator ready for export, and what its card says of it."""
+
+    exportable: Exportable
+    notes: list[str]
+    unphysical_before_mapping: float | None
+
+
+@click.command(help=__doc__)
+@click.option("--cry", required=True, type=click.Path(exists=True, path_type=Path), help="CRY's muons at sea level.")
+@click.option("--work", required=True, type=click.Path(path_type=Path), help="Folder for samples and checkpoints.")
+@click.option("--depth", "depths", multiple=True, type=int, default=(0, 10), show_default=True)
+@click.option("--architecture", "architectures", multiple=True, default=("quantile", "transformer"), show_default=True)
+def main(cry: Path, work: Path, depths: tuple[int, ...], architectures: tuple[str, ...]) -> None:
+    """Make each model of each depth, then the manifest."""
+    torch.set_num_threads(1)  # other numbers of threads round otherwise
+    make_sea_level(cry, work)
+    for depth in depths:
+        for part in ("training", "testing"):
+            make_sample(work, part, depth)
+        for architecture in architectures:
+            make_model(work, architecture, depth)
+    write_manifest()
+
+
+def sample_file(work: Path, part: str, depth: int, kind: str = "") -> Path:
+    """Where a sample lies."""
+    return work / "samples" / f"{part}-{depth}m{kind}.h5"
+
+
+def make_sea_level(cry: Path, work: Path) -> None:
+    """Smooth CRY's muons, by maps fitted on the training part; the held-out ones are kept raw as well."""
+    if sample_file(work, "testing", 0).exists():
+        return
+    (work / "samples").mkdir(parents=True, exist_ok=True)
+    training = read_cry(cry, slice(-HELD_OUT_CRY_MUONS))
+    testing = read_cry(cry, slice(-HELD_OUT_CRY_MUONS, None))
+    smooth = StepSmoother(training.muons)
+    write_sample(sample_file(work, "testing", 0, "-raw"), testing)
+    for part, sample in (("training", training), ("testing", testing)):
+        muons = smooth(sample.muons)
+        kept = muons.kinetic_energy >= MINIMUM_ENERGY
+        what = f"steps of CRY's tables taken out, {np.sum(~kept)} muons moved below 1 MeV dropped"
+        smoothed = sample.then(what, muons=muons[kept], rate=sample.rate * float(np.mean(kept)), smoothed=True)
+        write_sample(sample_file(work, part, 0), smoothed)
+
+
+def make_sample(work: Path, part: str, depth: int) -> None:
+    """Carry the muons of the layer above through ten metres of water, as far up as need be."""
+    path = sample_file(work, part, depth)
+    if path.exists():
+        return
+    make_sample(work, part, depth - LAYER)
+    above = read_sample(sample_file(work, part, depth - LAYER))
+    seed = depth + ("training", "testing").index(part)
+    write_sample(path, transport(above, LAYER, seed=seed).sample)
+
+
+def make_quantile(sample: Sample, folder: Path) -> Made:
+    """Fit and tabulate."""
+    generator = fit_quantile(sample.muons, seed=SEED, checkpoint=folder / "charge.pt")
+    tables = tabulate(generator)
+    return Made(tables, [*_tail_notes(generator), str(table_error(generator, tables, seed=SEED))], None)
+
+
+def _tail_notes(generator: QuantileGenerator) -> list[str]:
+    tails, clip = generator.tails, generator.condition
+    low, high = (1000 * generator.transform.energy(clip.low), generator.transform.energy(clip.high))
+    return [
+        f"Above {tails.high:.0f} GeV, where the training sample thins out, the flux above E goes as "
+        f"E^-{tails.high_exponent:.2f}, up to {ENERGY_MAX:.0e} GeV; below {1000 * tails.low:.1f} MeV the flux under E "
+        f"goes as E^{tails.low_exponent:.2f}, down to 1 MeV.",
+        f"Muons above {high:.0f} GeV share one distribution of angles and charges; so do those below {low:.1f} MeV.",
+    ]
+
+
+def make_transformer(sample: Sample, folder: Path) -> Made:
+    """Fit, and add what the paper's network lacks: true zenith angles and charges."""
+    network, transform = fit_transformer(sample.muons, seed=SEED, checkpoint=folder / "transformer.pt")
+    charge = fit_charge(sample.muons, transform, seed=SEED, checkpoint=folder / "charge.pt")
+    energy_range = MINIMUM_ENERGY, float(sample.muons.kinetic_energy.max())
+    model = TransformerModel.stored(
+        network,
+        transform=transform,
+        angle=radius_table(network, sample.muons, seed=SEED),
+        charge=ChargeTable.of(charge, transform),
+        energy_range=energy_range,
+    )
+    raw = raw_muons(model.network, EVALUATED_MUONS // 10, seed=SEED + 1)
+    energy, radius = box_cox(raw[:, 0] + transform.mean).numpy(), raw[:, 1:].norm(dim=1).numpy()
+    outside = (energy < energy_range[0]) | (energy > energy_range[1])
+    grazing = np.mean((radius < 1) & (radius > np.sqrt(1 - 0.2**2)))
+    truth = np.mean(sample.muons.cos_zenith < 0.2)
+    notes = [
+        f"The {model.muons_per_draw} muons of a draw are a stratified, correlated set.",
+        f"Of the bare network's muons {np.mean(radius >= 1):.2%} have cos2 x + cos2 y > 1, and {grazing:.3%} have cos "
+        f"zenith < 0.2, where the training sample has {truth:.3%}: the graph's table of zenith angles mends both. "
+        f"{np.mean(outside):.4%} have an energy outside of {energy_range[0]:g} to {energy_range[1]:.0f} GeV, to which "
+        "it is clipped.",
+    ]
+    return Made(model, notes, float(np.mean((radius >= 1) | outside)))
+
+
+ARCHITECTURES: dict[str, Callable[[Sample, Path], Made]] = {
+    "quantile": make_quantile,
+    "transformer": make_transformer,
+}
+
+
+def make_model(work: Path, architecture: str, depth: int) -> None:
+    """Fit, export and evaluate one model, and write its card."""
+    name = f"{architecture}-{depth}m"
+    folder = work / name
+    folder.mkdir(parents=True, exist_ok=True)
+    sample = read_sample(sample_file(work, "training", depth))
+    made = ARCHITECTURES[architecture](sample, folder)
+    path = RELEASED / f"{name}.onnx"
+    mismatch = export(made.exportable, Training(sample, SEED), path)
+    rounding = (
+        f"ONNX Runtime differs from PyTorch in double precision by at most {mismatch.energy:.1e} of the energy and "
+        f"{mismatch.direction:.1e} of a direction, on 100,000 muons."
+    )
+    testing = read_sample(sample_file(work, "testing", depth))
+    raw = sample_file(work, "testing", depth, "-raw")
+    generator = Generator.open(file=path, device="cpu")
+    evaluation = evaluate(
+        generator.sample(EVALUATED_MUONS, seed=SEED),
+        testing.muons,
+        seed=SEED,
+        muons_per_draw=made.exportable.muons_per_draw,
+        raw_truth=read_sample(raw).muons if raw.exists() else None,
+        generated_rate=(sample.rate, sample.rate_uncertainty),
+        truth_rate=(testing.rate, testing.rate_uncertainty),
+        energy_range=made.exportable.energy_range,
+        unphysical_before_mapping=made.unphysical_before_mapping,
+    )
+    EVALUATIONS.mkdir(parents=True, exist_ok=True)
+    (EVALUATIONS / f"{name}.json").write_text(evaluation.to_json())
+    pictures = EVALUATIONS / name
+    pictures.mkdir(exist_ok=True)
+    draw_pictures(evaluation, pictures, title=f"{architecture}, {depth} m")
+    command = f"python models/make.py --cry cry_sea_level.h5 --work work --depth {depth} --architecture {architecture}"
+    text = card(path, evaluation, command=command, provenance=sample.provenance, notes=[*made.notes, rounding])
+    (RELEASED / f"{name}.md").write_text(text)
+    click.echo(text)
+
+
+def write_manifest() -> None:
+    """List every released file with its hash and metadata; the default is the architecture that measures best."""
+    models = [manifest_entry(path) for path in sorted(RELEASED.glob("*.onnx"))]
+    models.sort(key=lambda entry: (entry["architecture"], float(entry["depth_m"])))
+    manifest = {"manifest_version": 1, "default_architecture": "quantile", "models": models}
+    (RELEASED / "manifest.json").write_text(json.dumps(manifest, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()

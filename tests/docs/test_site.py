@@ -1,0 +1,25 @@
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parents[2]
+LINK = re.compile(r"\]\(([^)#:]+)\)")
+
+
+@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md"])
+def test_links_lead_somewhere(page: str):
+    targets = LINK.findall((REPOSITORY / page).read_text(encoding="utf-8"))
+    assert targets
+    assert [target for target in targets if not (REPOSITORY / target).exists()] == []
+
+
+def test_every_module_of_training_is_in_the_reference():
+    # geant4_slab is the program of a worker process: importing it starts Geant4's Python.
+    modules = {path.stem for path in (REPOSITORY / "training" / "deepmuon_training").glob("[a-z]*.py")} - {
+        "geant4_slab"
+    }
+    reference = (REPOSITORY / "docs" / "python_training.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"automodule:: deepmuon_training\.(\w+)", reference)) == modules

@@ -1,0 +1,71 @@
+"""The models that come with the package."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+import numpy as np
+import onnx
+import pytest
+
+from deepmuon_runtime import Generator, Model, list_models
+from deepmuon_runtime.released import default_architecture, read_released, released_model
+
+ARCHITECTURES = ("quantile", "transformer")
+DEPTHS = (0, 10)
+LARGEST_FILE = 1_000_000  # bytes
+
+
+@pytest.fixture(params=[(depth, architecture) for architecture in ARCHITECTURES for depth in DEPTHS], ids=str)
+def model(request: pytest.FixtureRequest) -> Model:
+    return released_model(*request.param)
+
+
+def test_both_architectures_come_for_every_depth():
+    expected = {(architecture, depth) for architecture in ARCHITECTURES for depth in DEPTHS}
+    assert {(model.architecture, model.depth_m) for model in list_models()} == expected
+    assert default_architecture() in ARCHITECTURES
+
+
+def test_a_file_is_what_the_oldest_onnx_runtime_reads(model: Model):
+    content = read_released(model)
+    assert len(content) <= LARGEST_FILE
+    loaded = onnx.load_from_string(content)
+    onnx.checker.check_model(loaded, full_check=True)
+    assert loaded.ir_version <= 9
+    assert [(opset.domain, opset.version <= 20) for opset in loaded.opset_import] == [("", True)]
+    assert {node.domain for node in loaded.graph.node} == {""}
+    assert not [node.op_type for node in loaded.graph.node if node.op_type.startswith("Random")]
+    assert all(tensor.data_location != onnx.TensorProto.EXTERNAL for tensor in loaded.graph.initializer)
+
+
+def test_a_model_says_what_it_was_trained_on(model: Model):
+    keys = {"training_source", "training_smoothed", "training_muons", "training_seed", "boxcox_lambda", "energy_mean"}
+    assert keys <= model.metadata.keys()
+    assert model.rate_hz_per_m2 is not None
+    assert model.rate_uncertainty_hz_per_m2 is not None
+    assert 0 < model.rate_uncertainty_hz_per_m2 < 0.01 * model.rate_hz_per_m2
+
+
+def test_a_model_has_its_card(model: Model):
+    card = files("deepmuon_models").joinpath(model.name.replace(".onnx", ".md")).read_text(encoding="utf-8")
+    assert model.sha256 in card
+    for heading in ("\n## What made it\n", "\n## Scores\n", "\n## Limits\n"):
+        assert heading in card
+
+
+def test_a_model_gives_the_energies_directions_and_charges_of_its_depth(model: Model):
+    muons = Generator.open(model.depth_m, model.architecture, device="cpu").sample(200_000, seed=1)
+    # Of the held-out muons; the scores on the cards are the real judgement, this sees an exchange of files.
+    median_energy, positive = {0: (2.820, 0.518), 10: (3.142, 0.503)}[model.depth_m]
+    assert np.median(muons.kinetic_energy) == pytest.approx(median_energy, rel=0.03)
+    assert np.mean(muons.charge > 0) == pytest.approx(positive, abs=0.01)
+    assert muons.cos_zenith.mean(dtype=np.float64) == pytest.approx(0.80, abs=0.01)
+    assert muons.u.mean(dtype=np.float64) == pytest.approx(0, abs=0.02)
+    assert muons.v.mean(dtype=np.float64) == pytest.approx(0, abs=0.02)
+
+
+@pytest.mark.parametrize("architecture", ARCHITECTURES)
+def test_half_of_the_muons_survive_ten_metres_of_water(architecture: str):
+    surface, under_water = (released_model(depth, architecture).rate_hz_per_m2 for depth in DEPTHS)
+    assert under_water / surface == pytest.approx(0.504, abs=0.002)
