@@ -47,9 +47,12 @@ class MonotoneMap(nn.Module):
         self.coefficients = nn.Parameter(self.initial_coefficients())
 
     def initial_coefficients(self) -> torch.Tensor:
-        """Raw a, b and g [2 + units] of a nearly straight line of slope 0.5."""
-        raw = torch.full((2 + len(self.centres),), -5.0)
-        raw[0], raw[1] = 0.0, -0.4
+        """Return raw a, b and g [2 + units] of a line of slope 0.6, most of it from the units.
+
+        Units that begin near zero have no gradient to leave it by, and leave ripples in the slope.
+        """
+        raw = torch.full((2 + len(self.centres),), -1.26)
+        raw[0], raw[1] = 0.0, -2.0
         return raw
 
     def forward(self, t: torch.Tensor) -> torch.Tensor:

@@ -7,22 +7,17 @@ import torch
 __all__ = ["pinball_loss"]
 
 
-def pinball_loss(
-    predicted: torch.Tensor, observed: torch.Tensor, level: torch.Tensor, weight: torch.Tensor | None = None
-) -> torch.Tensor:
-    """Mean of level (y - q) where y > q, and (1 - level) (q - y) elsewhere.
+def pinball_loss(predicted: torch.Tensor, observed: torch.Tensor, level: torch.Tensor) -> torch.Tensor:
+    """Return level (y - q) where y > q, and (1 - level) (q - y) elsewhere.
 
     Its expectation is smallest where q is the quantile of y at `level` (R. Koenker and G. Bassett, Econometrica 46
     (1978) 33); averaged over all levels it is half the continuous ranked probability score, a one-dimensional
-    transport cost. A weight may depend on the level and on what y is conditioned on, never on y.
+    transport cost.
 
     Parameters
     ----------
     predicted, observed, level
         q, y and the level in (0, 1), of shapes that broadcast together.
-    weight
-        Weight of each term, 1 where not given.
     """
     difference = observed - predicted
-    loss = torch.maximum(level * difference, (level - 1) * difference)
-    return (loss if weight is None else loss * weight).mean()
+    return torch.maximum(level * difference, (level - 1) * difference)

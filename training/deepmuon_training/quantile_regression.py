@@ -30,6 +30,7 @@ _BINS = np.arange(-9, 9.05, 0.1)  # logit of the condition's levels that bound i
 _FEWEST_IN_BIN, _FEWEST_BEYOND = 50, 5
 _FLATTEST = 0.05
 _LEVELS_OF_MUON = 4
+_SIGNIFICANT = 2.0  # standard errors; one would often be exceeded by chance in a dozen looks
 _GOLDEN = (np.sqrt(5) - 1) / 2  # its multiples are spread evenly over (0, 1)
 
 Float = NDArray[np.float64]
@@ -39,7 +40,7 @@ def regress(network: MonotoneMap, values: Float, tail: float) -> None:
     """Fit a map without condition to values [n], at levels between `tail` and 1 - `tail`; exact, see `solve`."""
     edge = logit(1 - tail)
     level = np.linspace(-edge, edge, _POINTS)
-    quantiles = np.quantile(values, expit(level))
+    quantiles = np.quantile(values, expit(level), method="hazen")
     coarse = np.linspace(-edge, edge, _SLOPE_POINTS)
     slope = np.interp(level, coarse, np.gradient(np.interp(coarse, level, quantiles), coarse))
     network.solve(level, quantiles, np.sqrt(expit(level) * expit(-level)) / slope)
@@ -58,13 +59,13 @@ class RegressionSteps:
     rounds
         How many such rounds at most.
     patience
-        Stop after so many rounds without a smaller loss.
+        Stop after so many rounds whose loss is significantly above the smallest one.
     """
 
     adam: int = 1500
     round: int = 500
-    rounds: int = 20
-    patience: int = 12
+    rounds: int = 12
+    patience: int = 3
 
 
 def regress_conditional(
@@ -79,7 +80,8 @@ def regress_conditional(
 
     The bins are even in the logit of the condition's level, so that the sparse ends are resolved too. Adam is followed
     by L-BFGS (D. C. Liu and J. Nocedal, Math. Program. 45 (1989) 503), in double precision. The network is left
-    with the weights of the smallest pinball loss of the validation muons.
+    with the last weights whose pinball loss of the validation muons is not significantly above the smallest one: by
+    more than two standard errors of their difference, muon by muon.
 
     Parameters
     ----------
@@ -95,7 +97,7 @@ def regress_conditional(
     Returns
     -------
     float
-        The smallest pinball loss.
+        The pinball loss that these weights have.
     """
     points, quantiles, weights = (torch.from_numpy(part) for part in _binned_quantiles(*training))
     points = points.unsqueeze(-1)
@@ -120,30 +122,35 @@ def regress_conditional(
         tolerance_change=0,
         line_search_fn="strong_wolfe",
     )
-    best, best_weights, misses = _validation_loss(network, *validation), copy.deepcopy(network.state_dict()), 0
+    best = kept = _validation_losses(network, *validation)
+    kept_weights, misses = copy.deepcopy(network.state_dict()), 0
     with tqdm(range(steps.rounds), desc="zenith, L-BFGS", disable=not progress, unit="round") as bar:
         for _ in bar:
             lbfgs.step(lambda: _backward(lbfgs, loss))  # type: ignore[no-untyped-call]
-            found, misses = _validation_loss(network, *validation), misses + 1
-            if found < best:
-                best, best_weights, misses = found, copy.deepcopy(network.state_dict()), 0
-            bar.set_postfix(pinball=f"{found:.7g}", best=f"{best:.7g}", refresh=False)
+            found = _validation_losses(network, *validation)
+            excess = found - best
+            if excess.mean() > _SIGNIFICANT * excess.std() / np.sqrt(len(excess)):
+                misses += 1
+            else:
+                kept, kept_weights, misses = found, copy.deepcopy(network.state_dict()), 0
+            best = min(best, found, key=torch.mean)
+            bar.set_postfix(pinball=f"{found.mean():.7g}", best=f"{best.mean():.7g}", refresh=False)
             if misses == steps.patience:
                 break
-    network.load_state_dict(best_weights)
+    network.load_state_dict(kept_weights)
     network.float()
-    return best
+    return float(kept.mean())
 
 
-def _validation_loss(
+def _validation_losses(
     network: ConditionalMonotoneMap, condition: NDArray[np.float32], values: NDArray[np.float32]
-) -> float:
-    """Pinball loss of muons one by one, each at a few levels that together cover (0, 1) evenly."""
+) -> torch.Tensor:
+    """Return each muon's pinball loss [n], mean over a few levels; those of all muons cover (0, 1) evenly."""
     level = (np.arange(len(values))[:, None] * _GOLDEN + np.arange(_LEVELS_OF_MUON) / _LEVELS_OF_MUON) % 1
     level = torch.from_numpy(np.clip(level, 1e-6, 1 - 1e-6))
     with torch.no_grad():
         predicted = network(torch.logit(level), torch.from_numpy(condition).double().unsqueeze(-1))
-    return float(pinball_loss(predicted, torch.from_numpy(values).double().unsqueeze(-1), level))
+    return pinball_loss(predicted, torch.from_numpy(values).double().unsqueeze(-1), level).mean(dim=1)
 
 
 def _backward(optimizer: torch.optim.Optimizer, loss: Callable[[], torch.Tensor]) -> float:
@@ -160,7 +167,8 @@ def _binned_quantiles(condition: NDArray[np.float32], values: NDArray[np.float32
     edges = np.round(len(values) * np.concatenate([[0], expit(_BINS), [1]])).astype(int)
     rows = [slice(a, b) for a, b in pairwise(edges) if b - a >= _FEWEST_IN_BIN]
     level = expit(_LEVELS)
-    quantiles = np.array([np.quantile(values[row], level) for row in rows])
+    # Hazen's plotting positions are nearly unbiased in the logarithm of a tail's level.
+    quantiles = np.array([np.quantile(values[row], level, method="hazen") for row in rows])
     number = np.array([[row.stop - row.start] for row in rows])
     slope = np.maximum(np.gradient(quantiles, _LEVELS, axis=1), _FLATTEST)
     weights = number * level * (1 - level) / slope**2
