@@ -10,9 +10,10 @@ model, 4 to evaluate one.
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import click
 import numpy as np
@@ -160,40 +161,58 @@ ARCHITECTURES: dict[str, Callable[[Sample, Path], Made]] = {
 
 
 def make_model(work: Path, architecture: str, depth: int) -> None:
-    """Fit, export and evaluate one model, and write its card."""
+    """Fit and export one model, then evaluate it and write its card."""
     name = f"{architecture}-{depth}m"
     folder = work / name
     folder.mkdir(parents=True, exist_ok=True)
     sample = read_sample(sample_file(work, "training", depth))
-    made = ARCHITECTURES[architecture](sample, folder)
+    notes = folder / "notes.json"
+    if not notes.exists():
+        notes.write_text(json.dumps(fit_and_export(architecture, sample, folder / f"{name}.onnx")))
     path = RELEASED / f"{name}.onnx"
+    shutil.copyfile(folder / path.name, path)
+    evaluate_model(work, path, sample, **json.loads(notes.read_text()))
+
+
+def fit_and_export(architecture: str, sample: Sample, path: Path) -> dict[str, Any]:
+    """Write the ONNX file; return what only the fit knows of it."""
+    made = ARCHITECTURES[architecture](sample, path.parent)
     mismatch = export(made.exportable, Training(sample, SEED), path)
     rounding = (
         f"ONNX Runtime differs from PyTorch in double precision by at most {mismatch.energy:.1e} of the energy and "
         f"{mismatch.direction:.1e} of a direction, on 100,000 muons."
     )
+    return {"notes": [*made.notes, rounding], "unphysical_before_mapping": made.unphysical_before_mapping}
+
+
+def evaluate_model(
+    work: Path, path: Path, sample: Sample, notes: list[str], unphysical_before_mapping: float | None
+) -> None:
+    """Compare 20,000,000 muons with the held-out ones, and write scores, pictures and card."""
+    generator = Generator.open(file=path, device="cpu")
+    model, depth = generator.model, round(sample.depth_m)
     testing = read_sample(sample_file(work, "testing", depth))
     raw = sample_file(work, "testing", depth, "-raw")
-    generator = Generator.open(file=path, device="cpu")
     evaluation = evaluate(
         generator.sample(EVALUATED_MUONS, seed=SEED),
         testing.muons,
         seed=SEED,
-        muons_per_draw=made.exportable.muons_per_draw,
+        muons_per_draw=model.muons_per_draw,
         raw_truth=read_sample(raw).muons if raw.exists() else None,
         generated_rate=(sample.rate, sample.rate_uncertainty),
         truth_rate=(testing.rate, testing.rate_uncertainty),
-        energy_range=made.exportable.energy_range,
-        unphysical_before_mapping=made.unphysical_before_mapping,
+        energy_range=(model.energy_min_gev, model.energy_max_gev),
+        unphysical_before_mapping=unphysical_before_mapping,
     )
-    EVALUATIONS.mkdir(parents=True, exist_ok=True)
-    (EVALUATIONS / f"{name}.json").write_text(evaluation.to_json())
-    pictures = EVALUATIONS / name
-    pictures.mkdir(exist_ok=True)
-    draw_pictures(evaluation, pictures, title=f"{architecture}, {depth} m")
-    command = f"python models/make.py --cry cry_sea_level.h5 --work work --depth {depth} --architecture {architecture}"
-    text = card(path, evaluation, command=command, provenance=sample.provenance, notes=[*made.notes, rounding])
-    (RELEASED / f"{name}.md").write_text(text)
+    pictures = EVALUATIONS / path.stem
+    pictures.mkdir(parents=True, exist_ok=True)
+    (EVALUATIONS / f"{path.stem}.json").write_text(evaluation.to_json())
+    draw_pictures(evaluation, pictures, title=f"{model.architecture}, {depth} m")
+    command = (
+        f"python models/make.py --cry cry_sea_level.h5 --work work --depth {depth} --architecture {model.architecture}"
+    )
+    text = card(path, evaluation, command=command, provenance=sample.provenance, notes=notes)
+    path.with_suffix(".md").write_text(text)
     click.echo(text)
 
 

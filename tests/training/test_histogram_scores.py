@@ -13,6 +13,7 @@ from deepmuon_training.histogram_scores import (
     compare_charge,
     compare_energy_bins,
     compare_tails,
+    compare_zenith_bins,
     count_muons,
 )
 
@@ -54,6 +55,7 @@ def test_alike_samples_of_any_sizes_agree(truth, generated):
     assert abs(compare_charge(p, q).sigma) < 4
     assert max(abs(tail.pull) for tail in compare_tails(generated, truth)) < 4
     assert max(abs(bin_.pull) for bin_ in compare_energy_bins(p, q)) < 4.5
+    assert max(abs(bin_.pull) for bin_ in compare_zenith_bins(generated, truth)) < 4.5
 
 
 @pytest.mark.parametrize("sizes", [(20e6, 2e6), (2e6, 2e6), (2e6, 20e6)])
@@ -94,6 +96,15 @@ def test_an_energy_bin_reports_its_planted_deviation(truth):
     assert (worst.low, worst.high) == (ENERGY_EDGES[24], ENERGY_EDGES[25])
     assert abs(worst.deviation - 0.03) < 0.003 + 4 * worst.error  # 3 % of it raises the total by 0.2 %
     assert worst.pull == pytest.approx(worst.deviation / worst.error)
+
+
+def test_a_ripple_near_the_vertical_is_seen_in_the_zenith_bins(truth, generated):
+    zenith = np.degrees(np.arccos(np.minimum(generated.cos_zenith, 1)))
+    dropped = (zenith > 6) & (zenith < 8) & (np.random.default_rng(5).random(len(generated)) < 0.1)
+    bins = compare_zenith_bins(generated[~dropped], truth)
+    worst = max(bins, key=lambda bin_: abs(bin_.pull))
+    assert (worst.low, worst.high) == (6, 8)
+    assert abs(worst.deviation + 0.1) < 4 * worst.error
 
 
 def test_thin_energy_bins_are_left_out(truth):

@@ -48,9 +48,13 @@ def test_generated_muons_are_near_the_truth(generated, held_out, column, limit):
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 0.3), (0.3, 1.0), (1.0, 3.0), (3.0, 10.0), (10.0, 30.0), (30.0, 1e5)])
-def test_generated_zenith_angles_are_near_the_truth_at_any_energy(generated, held_out, low, high):
-    parts = (m[(m.kinetic_energy >= low) & (m.kinetic_energy < high)] for m in (generated, held_out))
-    assert distance(*parts, "cos_zenith") < 0.03
+def test_generated_zenith_angles_are_near_the_truth_at_any_energy(generated, held_out, sample, low, high):
+    trained, *parts = (
+        m[(m.kinetic_energy >= low) & (m.kinetic_energy < high)] for m in (sample.muons, generated, held_out)
+    )
+    # The training muons themselves are farther from the truth than this once in a hundred; 0.01 is for the short fit.
+    noise = 1.63 * np.sqrt(sum(1 / len(part) for part in (trained, *parts)))
+    assert distance(*parts, "cos_zenith") < noise + 0.01
 
 
 @pytest.mark.parametrize(("low", "high"), [(1e-3, 0.02), (100.0, 300.0), (300.0, 1e5)])

@@ -13,14 +13,15 @@ from deepmuon_training.azimuth import AzimuthScore, compare_azimuth
 from deepmuon_training.chi_square import ChiSquare
 from deepmuon_training.classifier import ClassifierScore, classify
 from deepmuon_training.histogram_scores import (
+    Bin,
     CellScore,
     Counts,
-    EnergyBin,
     TailScore,
     compare_cells,
     compare_charge,
     compare_energy_bins,
     compare_tails,
+    compare_zenith_bins,
     count_muons,
 )
 from deepmuon_training.independence import Independence, measure_independence
@@ -82,7 +83,7 @@ class Evaluation:
         On CRY's cells.
     cells_against_raw : CellScore or None
         The same against muons whose histogram steps were not taken out.
-    energy_bins, tails, charge, charge_ratio, azimuth, classifier, independence, unphysical, rate
+    energy_bins, zenith_bins, tails, charge, charge_ratio, azimuth, classifier, independence, unphysical, rate
         See their classes; rate is None where one is unknown.
     generated_spectra, held_out_spectra : Spectra
         What the pictures show.
@@ -95,7 +96,8 @@ class Evaluation:
     ks: dict[str, KolmogorovSmirnov]
     cells: CellScore
     cells_against_raw: CellScore | None
-    energy_bins: tuple[EnergyBin, ...]
+    energy_bins: tuple[Bin, ...]
+    zenith_bins: tuple[Bin, ...]
     tails: tuple[TailScore, ...]
     charge: ChiSquare
     charge_ratio: ChargeRatio
@@ -186,6 +188,7 @@ def evaluate(
         cells=compare_cells(p_counts, q_counts),
         cells_against_raw=None if raw_truth is None else compare_cells(p_counts, count_muons(raw_truth)),
         energy_bins=compare_energy_bins(p_counts, q_counts),
+        zenith_bins=compare_zenith_bins(p, q),
         tails=compare_tails(p, q),
         charge=compare_charge(p_counts, q_counts),
         charge_ratio=compare_charge_ratio(p, q),

@@ -18,22 +18,27 @@ from deepmuon_training.smoothing import COS_ZENITH_EDGES
 
 __all__ = [
     "ENERGY_EDGES",
+    "ZENITH_EDGES",
+    "Bin",
     "CellScore",
-    "EnergyBin",
     "TailScore",
     "compare_cells",
     "compare_charge",
     "compare_energy_bins",
     "compare_tails",
+    "compare_zenith_bins",
     "count_muons",
 ]
 
 ENERGY_EDGES = 10.0 ** np.linspace(-2, 3, 51)
 """Edges of the energy bins [GeV], ten to a decade; every second one is an edge of CRY's cells."""
 
+ZENITH_EDGES = np.linspace(0, 90, 46)
+"""Edges of the zenith bins [degrees], two degrees wide."""
+
 _CHUNK = 1 << 20  # muons counted at a time: bounds the memory
 _FEWEST_IN_CELL = 10  # expected muons under which a cell is left out
-_FEWEST_IN_BIN = 10_000  # muons under which an energy bin is left out
+_FEWEST_IN_BIN = 10_000  # muons under which a bin is left out
 
 Counts = NDArray[np.int64]
 
@@ -58,8 +63,8 @@ class CellScore:
 
 
 @dataclass(frozen=True)
-class EnergyBin:
-    """One energy bin: edges [GeV], counts, p / (s q) - 1, its error sqrt(1/p + 1/q), and their quotient."""
+class Bin:
+    """One bin: edges [GeV or degrees], counts, p / (s q) - 1, its error sqrt(1/p + 1/q), and their quotient."""
 
     low: float
     high: float
@@ -120,15 +125,37 @@ def compare_cells(generated: Counts, held_out: Counts) -> CellScore:
     )
 
 
-def compare_energy_bins(generated: Counts, held_out: Counts) -> tuple[EnergyBin, ...]:
+def compare_energy_bins(generated: Counts, held_out: Counts) -> tuple[Bin, ...]:
     """Compare two tables of `count_muons` in energy bins that hold 10,000 and more muons of both."""
-    s = float(generated.sum() / held_out.sum())
-    contents = (counts.sum(axis=(0, 2))[1:-1].tolist() for counts in (generated, held_out))
+    p, q = (counts.sum(axis=(0, 2))[1:-1] for counts in (generated, held_out))
+    return _compare_bins(ENERGY_EDGES, p, q, float(generated.sum() / held_out.sum()))
+
+
+def compare_zenith_bins(generated: Muons, held_out: Muons) -> tuple[Bin, ...]:
+    """Compare the zenith angles in bins of two degrees that hold 10,000 and more muons of both.
+
+    These are finer than CRY's cells near the vertical, where imaging needs the muons' density.
+    """
+    return _compare_bins(
+        ZENITH_EDGES, _count_zenith(generated), _count_zenith(held_out), len(generated) / len(held_out)
+    )
+
+
+def _count_zenith(muons: Muons) -> Counts:
+    counts = np.zeros(len(ZENITH_EDGES) - 1, np.int64)
+    for start in range(0, len(muons), _CHUNK):
+        part = muons[start : start + _CHUNK]
+        zenith = np.degrees(np.arctan2(np.hypot(part.u, part.v), part.cos_zenith))
+        counts += np.histogram(zenith, ZENITH_EDGES)[0]
+    return counts
+
+
+def _compare_bins(edges: NDArray[np.float64], generated: Counts, held_out: Counts, s: float) -> tuple[Bin, ...]:
     bins = []
-    for low, high, p, q in zip(ENERGY_EDGES[:-1], ENERGY_EDGES[1:], *contents, strict=True):
+    for low, high, p, q in zip(edges[:-1], edges[1:], generated.tolist(), held_out.tolist(), strict=True):
         if min(p, q) >= _FEWEST_IN_BIN:
             deviation, error = p / (s * q) - 1, sqrt(1 / p + 1 / q)
-            bins.append(EnergyBin(float(low), float(high), p, q, deviation, error, deviation / error))
+            bins.append(Bin(float(low), float(high), p, q, deviation, error, deviation / error))
     return tuple(bins)
 
 

@@ -112,11 +112,15 @@ def _scores(evaluation: Evaluation) -> Iterator[Score]:
         if cells is not None:
             yield _chi_square_score(f"{name}: chi2/ndf", cells.chi_square)
             yield Score(f"{name}: delta", cells.delta, 0.0, cells.delta_noise)
-    if evaluation.energy_bins:
-        worst = max(evaluation.energy_bins, key=lambda a: abs(a.pull))
-        excess = max(abs(a.deviation) - 3 * a.error for a in evaluation.energy_bins)
-        name = f"energy bin, worst of {len(evaluation.energy_bins)} ({worst.low:.3g} to {worst.high:.3g} GeV)"
-        yield Score(name, worst.deviation, 0.0, worst.error, worst.pull, excess)
+    for quantity, unit, bins in (
+        ("energy", "GeV", evaluation.energy_bins),
+        ("zenith", "degrees", evaluation.zenith_bins),
+    ):
+        if bins:
+            worst = max(bins, key=lambda a: abs(a.pull))
+            excess = max(abs(a.deviation) - 3 * a.error for a in bins)
+            name = f"{quantity} bin, worst of {len(bins)} ({worst.low:.3g} to {worst.high:.3g} {unit})"
+            yield Score(name, worst.deviation, 0.0, worst.error, worst.pull, excess)
     for tail in evaluation.tails:
         if tail.expected > 0:
             ratio, error = tail.found / tail.expected, tail.error / tail.expected
