@@ -1,5 +1,6 @@
 """Samples cosmic-ray muons from small ONNX generators."""
 
+from deepmuon_runtime.check import Report, check_file
 from deepmuon_runtime.errors import DeepMuonError, FailedError, RefusedError
 from deepmuon_runtime.generator import Generator
 from deepmuon_runtime.latent import new_seed
@@ -16,6 +17,8 @@ __all__ = [
     "MuonWriter",
     "Muons",
     "RefusedError",
+    "Report",
+    "check_file",
     "list_models",
     "new_seed",
     "read_attributes",
