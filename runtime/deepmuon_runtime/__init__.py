@@ -8,6 +8,7 @@ from deepmuon_runtime.model import Model
 from deepmuon_runtime.muon_file import MuonWriter, read_attributes, read_muons, write_muons
 from deepmuon_runtime.muons import Muons
 from deepmuon_runtime.released import list_models
+from deepmuon_runtime.shard import Shard
 
 __all__ = [
     "DeepMuonError",
@@ -18,6 +19,7 @@ __all__ = [
     "Muons",
     "RefusedError",
     "Report",
+    "Shard",
     "check_file",
     "list_models",
     "new_seed",

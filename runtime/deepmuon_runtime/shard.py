@@ -36,7 +36,7 @@ class Shard:
     def __post_init__(self) -> None:
         """Check the numbers."""
         if not 1 <= self.number <= self.of:
-            raise RefusedError(f"there is no shard {self}: shards are 1/{self.of} to {self.of}/{self.of}, of 1 or more")
+            raise RefusedError(f"there is no shard {self}: shard i/k has i from 1 to k")
 
     @classmethod
     def parse(cls, text: str) -> Shard:
