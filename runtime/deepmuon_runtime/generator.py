@@ -10,6 +10,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -282,10 +283,11 @@ class Generator:
         }
 
     def _parts(self, numbers: range) -> Iterator[range]:
-        """Cut the numbers of muons at multiples of so many blocks."""
+        """Cut the numbers of muons at multiples of so many blocks; the first part decides a file's chunk, and is not less."""
         size = CHUNK_BLOCKS * self._block_draws * self.model.muons_per_draw
-        aligned = range(numbers.start - numbers.start % size, numbers.stop, size)
-        return (range(max(start, numbers.start), min(start + size, numbers.stop)) for start in aligned if numbers)
+        first_end = -(-numbers.start // size) * size + size
+        edges = chain([numbers.start], range(first_end, numbers.stop, size), [numbers.stop])
+        return (range(start, stop) for start, stop in pairwise(edges) if numbers)
 
     def _fill(self, muons: Muons, seed: int, first: int) -> None:
         """Make the muons from number `first` on, block by block."""

@@ -5,6 +5,7 @@ import threading
 from contextlib import closing
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -99,6 +100,14 @@ def test_the_shards_joined_are_the_single_run(generator, many, tmp_path, of):
         assert found["live_time_s_m2"] == len(part) / 55.5
         count += len(part)
     assert count == len(many)
+
+
+def test_a_shard_is_stored_in_chunks_as_large_as_those_of_the_single_run(model_file, tmp_path):
+    generator = Generator.open(file=model_file)
+    for shard in (Shard(1, 1), Shard(2, 3)):
+        generator.write(tmp_path / "muons.h5", 900_000, seed=5, shard=shard, overwrite=True)
+        with h5py.File(tmp_path / "muons.h5") as file:
+            assert file["muons/u"].chunks == (1 << 17,)
 
 
 def test_there_may_be_more_shards_than_muons(generator, many, tmp_path):
