@@ -4,6 +4,7 @@ from deepmuon_runtime.check import Report, check_file
 from deepmuon_runtime.errors import DeepMuonError, FailedError, RefusedError
 from deepmuon_runtime.generator import Generator
 from deepmuon_runtime.latent import new_seed
+from deepmuon_runtime.merge import merge_shards
 from deepmuon_runtime.model import Model
 from deepmuon_runtime.muon_file import MuonWriter, read_attributes, read_muons, write_muons
 from deepmuon_runtime.muons import Muons
@@ -22,6 +23,7 @@ __all__ = [
     "Shard",
     "check_file",
     "list_models",
+    "merge_shards",
     "new_seed",
     "read_attributes",
     "read_muons",
