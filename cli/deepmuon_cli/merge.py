@@ -25,7 +25,7 @@ def merge(shards: tuple[Path, ...], output: Path, overwrite: bool, quiet: bool) 
     """Join the shards of a run to the file that one machine would have written.
 
     \b
-        deepmuon-merge part-*.h5 -o muons.h5
+        deepmuon-merge part-1.h5 part-2.h5 part-3.h5 -o muons.h5
 
     The files come from `deepmuon-gen --shard`, in any order. Shards of different runs, missing ones, and muons that are
     in two of them are refused.

@@ -283,7 +283,7 @@ class Generator:
         }
 
     def _parts(self, numbers: range) -> Iterator[range]:
-        """Cut the numbers of muons at multiples of so many blocks; the first part makes a file's chunks: no small one."""
+        """Cut the numbers of muons at multiples of many blocks; the first part makes a file's chunks: no small one."""
         size = CHUNK_BLOCKS * self._block_draws * self.model.muons_per_draw
         first_end = -(-numbers.start // size) * size + size
         edges = chain([numbers.start], range(first_end, numbers.stop, size), [numbers.stop])
