@@ -4,6 +4,7 @@
 0     done
 1     failed while running: disk full, the model gave a bad muon, lost a race for the output
 2     refused before anything started: bad arguments, no such depth, bad input, output exists
+3     `deepmuon-check` found a defect
 130   stopped by Ctrl-C
 143   stopped by SIGTERM
 ====  ===========================================================================================
@@ -19,10 +20,11 @@ from typing import NoReturn
 
 import click
 
-__all__ = ["run"]
+__all__ = ["DEFECTIVE", "run"]
 
 FAILED = 1
 REFUSED = 2
+DEFECTIVE = 3
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -60,7 +62,7 @@ def _stop(number: int, frame: FrameType | None) -> NoReturn:
 def _outcome(command: click.Command, name: str) -> tuple[int, str]:
     """Return the exit code, and the reason where there is one."""
     try:
-        command.main(prog_name=name, standalone_mode=False)
+        code = command.main(prog_name=name, standalone_mode=False)  # that of click.Context.exit, or None
     except click.ClickException as error:
         return REFUSED, " ".join(error.format_message().split())
     except _Stopped as stopped:
@@ -72,4 +74,4 @@ def _outcome(command: click.Command, name: str) -> tuple[int, str]:
         if isinstance(error, (FailedError, RefusedError)):
             return (REFUSED if isinstance(error, RefusedError) else FAILED), str(error)
         raise
-    return 0, ""
+    return code or 0, ""

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, NoReturn
 import click
 
 from deepmuon_cli.ending import run
-from deepmuon_cli.numbers import muon_number, positive_number, seed_number
+from deepmuon_cli.numbers import muon_number, positive_number, seed_number, shard_number
 
 if TYPE_CHECKING:  # the libraries are imported when they are needed: --help is answered at once
-    from deepmuon_runtime import Generator
+    from deepmuon_runtime import Generator, Shard
 
 __all__ = ["gen", "main"]
 
@@ -39,6 +39,12 @@ FILE = click.Path(path_type=Path)
 @click.option("--overwrite", is_flag=True, help="Replace an existing file, once the new one is complete.")
 @click.option("--seed", type=seed_number, metavar="SEED", help="0 to 2^64 - 1; a new one if left out.")
 @click.option(
+    "--shard",
+    type=shard_number,
+    metavar="I/K",
+    help="Only part I of K, from 1, of the muons; --seed must be stated, the same for all parts.",
+)
+@click.option(
     "--device",
     default="auto",
     metavar="NAME",
@@ -58,6 +64,7 @@ def gen(
     output: Path | None,
     overwrite: bool,
     seed: int | None,
+    shard: Shard | None,
     device: str,
     threads: int | None,
     quiet: bool,
@@ -78,6 +85,11 @@ def gen(
     \b
         deepmuon-gen --depth 0 --live-time 3600 --area 4 --seed 1 -o hour.h5
 
+    The first of 100 parts of ten billion muons, which 100 jobs of a batch farm make:
+
+    \b
+        deepmuon-gen --depth 10 -n 1e10 --seed 1 --shard 1/100 -o muons-1.h5
+
     And in Python:
 
     \b
@@ -96,11 +108,14 @@ def gen(
         return
     _check_model_options(depth, architecture, model)
     _check_number_options(number, live_time, area)
+    if shard is not None and seed is None:
+        raise click.UsageError("--shard needs a --seed, the same for all shards: without it each would have its own")
     if output is None:
         raise click.UsageError("where to? Give the name of a file: -o muons.h5")
 
     from deepmuon_runtime import Generator, new_seed
     from deepmuon_runtime.muon_file import check_output
+    from deepmuon_runtime.shard import WHOLE_RUN
 
     check_output(output, overwrite)
     generator = Generator.open(depth, architecture, file=model, device=device, threads=threads)
@@ -110,10 +125,14 @@ def gen(
         number = generator.number_in_live_time(live_time, area, seed)
         attributes = {"live_time_s": live_time, "area_m2": area}
     assert number is not None
-    with _progress(number, hidden=quiet) as progress:
-        generator.write(output, number, seed, overwrite=overwrite, progress=progress, attributes=attributes)
+    shard = shard or WHOLE_RUN
+    count = len(shard.numbers(number))
+    with _progress(count, hidden=quiet) as progress:
+        generator.write(
+            output, number, seed, shard=shard, overwrite=overwrite, progress=progress, attributes=attributes
+        )
     if not quiet:
-        click.echo(_closing_line(output, number, time.perf_counter() - started, generator, seed))
+        click.echo(_closing_line(output, count, time.perf_counter() - started, generator, seed))
 
 
 def main() -> NoReturn:

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import math
 from decimal import Decimal, InvalidOperation
+from typing import TYPE_CHECKING
 
 import click
 
-__all__ = ["muon_number", "positive_number", "seed_number"]
+if TYPE_CHECKING:
+    from deepmuon_runtime import Shard
+
+__all__ = ["muon_number", "positive_number", "seed_number", "shard_number"]
 
 
 def muon_number(text: str) -> int:
@@ -48,6 +52,23 @@ def seed_number(text: str) -> int:
     if not 0 <= seed <= LARGEST_SEED:
         raise click.BadParameter(f"{text} is not from 0 to 2^64 - 1")
     return seed
+
+
+def shard_number(text: str) -> Shard:
+    """Read which part of a run, i/k.
+
+    Raises
+    ------
+    click.BadParameter
+        If it is none of 1/k to k/k.
+    """
+    from deepmuon_runtime.errors import RefusedError
+    from deepmuon_runtime.shard import Shard
+
+    try:
+        return Shard.parse(text)
+    except RefusedError as error:
+        raise click.BadParameter(str(error)) from error
 
 
 def positive_number(text: str) -> float:

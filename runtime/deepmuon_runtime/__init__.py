@@ -1,12 +1,15 @@
 """Samples cosmic-ray muons from small ONNX generators."""
 
+from deepmuon_runtime.check import Report, check_file
 from deepmuon_runtime.errors import DeepMuonError, FailedError, RefusedError
 from deepmuon_runtime.generator import Generator
 from deepmuon_runtime.latent import new_seed
+from deepmuon_runtime.merge import merge_shards
 from deepmuon_runtime.model import Model
 from deepmuon_runtime.muon_file import MuonWriter, read_attributes, read_muons, write_muons
 from deepmuon_runtime.muons import Muons
 from deepmuon_runtime.released import list_models
+from deepmuon_runtime.shard import Shard
 
 __all__ = [
     "DeepMuonError",
@@ -16,7 +19,11 @@ __all__ = [
     "MuonWriter",
     "Muons",
     "RefusedError",
+    "Report",
+    "Shard",
+    "check_file",
     "list_models",
+    "merge_shards",
     "new_seed",
     "read_attributes",
     "read_muons",

@@ -10,6 +10,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,6 +26,7 @@ from deepmuon_runtime.ordered_map import ordered_map
 from deepmuon_runtime.physical import check_physical
 from deepmuon_runtime.poisson import poisson
 from deepmuon_runtime.released import read_released, released_model
+from deepmuon_runtime.shard import WHOLE_RUN, Shard
 
 if TYPE_CHECKING:
     import onnxruntime
@@ -125,7 +127,7 @@ class Generator:
         generator._try()
         return generator
 
-    def sample(self, n: int, seed: int | None = None) -> Muons:
+    def sample(self, n: int, seed: int | None = None, *, first: int = 0) -> Muons:
         """Return n muons as columns, all in memory.
 
         Parameters
@@ -134,6 +136,8 @@ class Generator:
             How many, 0 to 2^53.
         seed
             0 to 2^64 - 1; one from the operating system if left out.
+        first
+            Number of the first of them among the muons of the seed.
 
         Returns
         -------
@@ -142,28 +146,34 @@ class Generator:
         Raises
         ------
         RefusedError
-            If n or the seed is out of range, or the memory does not hold n muons.
+            If n, `first`, their sum or the seed is out of range, or the memory does not hold n muons.
         FailedError
             If the model gives an unphysical muon.
         """
-        n, seed = _checked_number(n), _seed(seed)
+        numbers, seed = _checked_numbers(n, first), _seed(seed)
         try:
-            muons = Muons.empty(n)
+            muons = Muons.empty(len(numbers))
         except (MemoryError, ValueError) as error:
             raise RefusedError(f"{n} muons do not fit in memory: take them in chunks, or write a file") from error
-        for _ in ordered_map(lambda span: self._fill(muons[span], seed, span.start), self._spans(n), self.threads):
+
+        def fill(part: range) -> None:
+            self._fill(muons[part.start - numbers.start : part.stop - numbers.start], seed, part.start)
+
+        for _ in ordered_map(fill, self._parts(numbers), self.threads):
             pass
         return muons
 
-    def chunks(self, n: int, seed: int | None = None) -> collections.abc.Generator[Muons, None, None]:
+    def chunks(
+        self, n: int, seed: int | None = None, *, first: int = 0
+    ) -> collections.abc.Generator[Muons, None, None]:
         """Yield n muons in pieces of about a hundred thousand, for those who stream.
 
-        The memory needed does not grow with n. The pieces one after the other are `sample(n, seed)`. Whoever
-        stops before the end should close the iterator (`contextlib.closing`), which stops the threads.
+        The memory needed does not grow with n. The pieces one after the other are `sample(n, seed, first=first)`.
+        Whoever stops before the end should close the iterator (`contextlib.closing`), which stops the threads.
 
         Parameters
         ----------
-        n, seed
+        n, seed, first
             As for `sample`.
 
         Raises
@@ -171,14 +181,14 @@ class Generator:
         RefusedError, FailedError
             As `sample`.
         """
-        n, seed = _checked_number(n), _seed(seed)
+        numbers, seed = _checked_numbers(n, first), _seed(seed)
 
-        def chunk(span: slice) -> Muons:
-            muons = Muons.empty(span.stop - span.start)
-            self._fill(muons, seed, span.start)
+        def chunk(part: range) -> Muons:
+            muons = Muons.empty(len(part))
+            self._fill(muons, seed, part.start)
             return muons
 
-        return ordered_map(chunk, self._spans(n), self.threads)
+        return ordered_map(chunk, self._parts(numbers), self.threads)
 
     def write(
         self,
@@ -186,11 +196,12 @@ class Generator:
         n: int,
         seed: int | None = None,
         *,
+        shard: Shard = WHOLE_RUN,
         overwrite: bool = False,
         progress: Callable[[int], object] | None = None,
         attributes: Mapping[str, object] | None = None,
     ) -> None:
-        """Write n muons to an HDF5 file, which appears under its name only when it is complete.
+        """Write n muons, or a shard of them, to an HDF5 file, which appears under its name only when it is complete.
 
         Parameters
         ----------
@@ -198,6 +209,8 @@ class Generator:
             The file; its folder must exist.
         n, seed
             As for `sample`; the file records the seed.
+        shard
+            Which part of the n muons. The shards of one seed, made on any machines, together are the n muons.
         overwrite
             Whether an existing file may be replaced.
         progress
@@ -212,10 +225,12 @@ class Generator:
         FailedError
             If the model gives an unphysical muon, writing fails, or another process writes `path` meanwhile.
         """
-        n, seed = _checked_number(n), _seed(seed)
-        _check_space(check_output(path, overwrite).parent, n)
-        described = {**self._attributes(n, seed), **(attributes or {})}
-        with MuonWriter(path, described, overwrite) as writer, closing(self.chunks(n, seed)) as chunks:
+        total, seed = len(_checked_numbers(n)), _seed(seed)
+        numbers = shard.numbers(total)
+        _check_space(check_output(path, overwrite).parent, len(numbers))
+        described = {**self._attributes(seed, shard, total), **(attributes or {})}
+        chunks = self.chunks(len(numbers), seed, first=numbers.start)
+        with MuonWriter(path, described, overwrite) as writer, closing(chunks):
             for muons in chunks:
                 writer.append(muons)
                 if progress is not None:
@@ -247,7 +262,7 @@ class Generator:
             )
         return poisson(mean, checked_seed(seed))
 
-    def _attributes(self, n: int, seed: int) -> dict[str, object]:
+    def _attributes(self, seed: int, shard: Shard, total: int) -> dict[str, object]:
         model = self.model
         rates = {
             "rate_hz_per_m2": model.rate_hz_per_m2,
@@ -257,9 +272,9 @@ class Generator:
             "depth_m": model.depth_m,
             "medium": model.medium,
             "seed": np.uint64(seed),
-            "first": 0,
-            "total": n,
-            "shard": "1/1",
+            "first": shard.numbers(total).start,
+            "total": total,
+            "shard": str(shard),
             "model_sha256": model.sha256,
             "architecture": model.architecture,
             "device": self.device,
@@ -267,9 +282,12 @@ class Generator:
             **{name: rate for name, rate in rates.items() if rate is not None},
         }
 
-    def _spans(self, n: int) -> Iterator[slice]:
+    def _parts(self, numbers: range) -> Iterator[range]:
+        """Cut the numbers of muons at multiples of many blocks; the first part makes a file's chunks: no small one."""
         size = CHUNK_BLOCKS * self._block_draws * self.model.muons_per_draw
-        return (slice(start, min(start + size, n)) for start in range(0, n, size))
+        first_end = -(-numbers.start // size) * size + size
+        edges = chain([numbers.start], range(first_end, numbers.stop, size), [numbers.stop])
+        return (range(start, stop) for start, stop in pairwise(edges) if numbers)
 
     def _fill(self, muons: Muons, seed: int, first: int) -> None:
         """Make the muons from number `first` on, block by block."""
@@ -334,10 +352,14 @@ def _usable_processors() -> int:
     return os.cpu_count() or 1
 
 
-def _checked_number(n: float) -> int:
-    if not (0 <= n <= LARGEST_NUMBER and n == int(n)):
-        raise RefusedError(f"{n} is no number of muons: a whole number from 0 to 2^53 is")
-    return int(n)
+def _checked_numbers(n: float, first: float = 0) -> range:
+    """Return the numbers of n muons from `first` on."""
+    for number, meaning in ((n, "number of muons"), (first, "number of a first muon")):
+        if not (0 <= number <= LARGEST_NUMBER and number == int(number)):
+            raise RefusedError(f"{number} is no {meaning}: a whole number from 0 to 2^53 is")
+    if first + n > LARGEST_NUMBER:
+        raise RefusedError(f"{n} muons from number {first} on end after number 2^53")
+    return range(int(first), int(first) + int(n))
 
 
 def _seed(seed: int | None) -> int:

@@ -35,13 +35,18 @@ from deepmuon_runtime.quiet_file import QuietFile
 
 __all__ = [
     "BYTES_PER_MUON",
+    "COLUMNS",
     "FORMAT",
     "FORMAT_VERSION",
     "PARTIAL_SUFFIX",
+    "READ_ERRORS",
     "MuonWriter",
+    "check_format",
     "check_output",
+    "python_value",
     "read_attributes",
     "read_muons",
+    "reason",
     "write_muons",
 ]
 
@@ -51,6 +56,9 @@ FORMAT_VERSION = 1
 PARTIAL_SUFFIX = ".deepmuon-partial"
 """Ends the name of a file that is still being written, or that a killed process left behind."""
 
+READ_ERRORS = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, MemoryError)
+"""What h5py raises when a file is damaged."""
+
 COLUMNS: dict[str, tuple[np.dtype[Any], str]] = {
     "kinetic_energy": (np.dtype("<f4"), "GeV"),
     "u": (np.dtype("<f4"), "1"),
@@ -58,6 +66,8 @@ COLUMNS: dict[str, tuple[np.dtype[Any], str]] = {
     "w": (np.dtype("<f4"), "1"),
     "pdg_id": (np.dtype("i1"), "1"),
 }
+"""Type and unit of each dataset of `/muons`."""
+
 REQUIRED_ATTRIBUTES = ("count", "depth_m", "medium", "created", "created_by")
 
 BYTES_PER_MUON = sum(dtype.itemsize for dtype, _ in COLUMNS.values())
@@ -101,7 +111,7 @@ def check_output(path: str | Path, overwrite: bool = False) -> Path:
         if not os.access(target.parent, os.W_OK | os.X_OK):
             raise RefusedError(f"{path} can't be written: the folder {target.parent} is not writable")
     except (OSError, ValueError) as error:  # a name too long, a null byte, a folder that may not be searched
-        raise RefusedError(f"{path} can't be written: {_reason(error)}") from error
+        raise RefusedError(f"{path} can't be written: {reason(error)}") from error
     return target
 
 
@@ -158,7 +168,7 @@ class MuonWriter:
         except BaseException as error:
             self._discard()
             if isinstance(error, OSError):
-                raise RefusedError(f"{self.path} can't be written: {_reason(error)}") from error
+                raise RefusedError(f"{self.path} can't be written: {reason(error)}") from error
             raise
         return self
 
@@ -253,7 +263,7 @@ class MuonWriter:
         except FileExistsError as error:
             raise FailedError(f"{self.path} was written by another process meanwhile: kept as it is") from error
         except OSError as error:
-            raise FailedError(f"{self.path} was not written: {_reason(error)}") from error
+            raise FailedError(f"{self.path} was not written: {reason(error)}") from error
 
     def _discard(self) -> None:
         """Let go of the temporary file, and of its temporary name."""
@@ -334,7 +344,7 @@ def read_attributes(path: str | Path) -> dict[str, Any]:
         If the file can't be read or is no muon file.
     """
     with _opened(path) as group:
-        return {name: _python_value(value) for name, value in group.attrs.items()}
+        return {name: python_value(value) for name, value in group.attrs.items()}
 
 
 @contextmanager
@@ -343,16 +353,21 @@ def _opened(path: str | Path) -> Iterator[h5py.Group]:
     try:
         with h5py.File(path, "r") as file:
             yield _checked(file, path)
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, MemoryError) as error:
-        raise RefusedError(f"{path} can't be read as a muon file: {_reason(error)}") from error
+    except READ_ERRORS as error:
+        raise RefusedError(f"{path} can't be read as a muon file: {reason(error)}") from error
 
 
-def _checked(file: h5py.File, path: str | Path) -> h5py.Group:
+def check_format(file: h5py.File, path: str | Path) -> None:
+    """Raise RefusedError unless a file says that it is a muon file of this version."""
     form, form_version = file.attrs.get("format"), file.attrs.get("format_version")
     if form != FORMAT:
         raise RefusedError(f"{path} is no muon file: it lacks the attribute format={FORMAT!r}")
     if form_version != FORMAT_VERSION:
         raise RefusedError(f"{path} has format version {form_version}, and this release reads version {FORMAT_VERSION}")
+
+
+def _checked(file: h5py.File, path: str | Path) -> h5py.Group:
+    check_format(file, path)
     group = file.get("muons")
     if not isinstance(group, h5py.Group):
         raise RefusedError(f"{path} has no group /muons")
@@ -368,7 +383,8 @@ def _checked(file: h5py.File, path: str | Path) -> h5py.Group:
     return group
 
 
-def _python_value(value: Any) -> Any:
+def python_value(value: Any) -> Any:
+    """Return an attribute as Python's str, int, float, bool, or a list of them."""
     if isinstance(value, np.ndarray):
         return value.tolist()
     return value.item() if isinstance(value, np.generic) else value
@@ -395,8 +411,8 @@ def _flush_names_to_disk(folder: Path) -> None:
         os.close(descriptor)
 
 
-def _reason(error: BaseException) -> str:
-    """Return the cause in one line."""
+def reason(error: BaseException) -> str:
+    """Return the cause of an error in one line."""
     if isinstance(error, OSError) and error.errno:
         return os.strerror(error.errno)
     return " ".join(str(error).split()) or type(error).__name__

@@ -14,7 +14,7 @@ import pytest
 from support.tiny_models import RARELY_BAD, tiny_model
 
 from deepmuon_cli.gen import main
-from deepmuon_runtime import Generator, read_attributes, read_muons
+from deepmuon_runtime import Generator, Muons, read_attributes, read_muons
 
 COMMAND = [sys.executable, "-m", "deepmuon_cli.gen"]
 
@@ -101,6 +101,21 @@ def test_threads_change_nothing(gen, model_file):
         assert np.array_equal(getattr(read_muons("1.h5"), column), getattr(read_muons("3.h5"), column))
 
 
+@pytest.mark.parametrize("amount", [("-n", "1e5"), ("--live-time", 1e3, "--area", 1)], ids=["number", "live time"])
+def test_shards_are_the_single_run(gen, model_file, amount):
+    arguments = ("--model", model_file, *amount, "--seed", 3)
+    assert gen(*arguments, "-o", "all.h5")[0] == 0
+    joined = []
+    for i in (1, 2, 3):
+        code, out, _ = gen(*arguments, "--shard", f"{i}/3", "-o", f"{i}.h5")
+        joined.append(read_muons(f"{i}.h5"))
+        assert code == 0
+        assert out.startswith(f"{i}.h5: {len(joined[-1]):,} muons in ")
+        assert read_attributes(f"{i}.h5")["shard"] == f"{i}/3"
+    for column in ("kinetic_energy", "u", "v", "w", "pdg_id"):
+        assert np.array_equal(getattr(Muons.concatenate(joined), column), getattr(read_muons("all.h5"), column))
+
+
 def test_a_live_time_gives_a_poisson_number_at_the_models_rate(gen, model_file):
     """At 5 standard deviations of the sum of 20 numbers: 1e-6 false alarms."""
     counts = []
@@ -160,7 +175,7 @@ def test_the_help_teaches_by_an_example(gen):
     assert code == 0
     assert "\n      deepmuon-gen --depth 10 -n 1e7 -o muons.h5\n" in out
     options = """--depth --architecture --model --number --output --seed --device --threads --overwrite
-        --list --quiet --version --live-time --area"""
+        --shard --list --quiet --version --live-time --area"""
     assert all(option in out for option in options.split())
 
 
@@ -216,6 +231,11 @@ GOOD = {"--depth": "10", "-n": "10", "-o": "muons.h5"}
         ({"--seed": "-1"}, "-1 is not from 0 to 2^64 - 1"),
         ({"--seed": str(2**64)}, "is not from 0 to 2^64 - 1"),
         ({"--seed": "0.5"}, "0.5 is not a whole number"),
+        ({"--shard": "1/2"}, "--shard needs a --seed"),
+        ({"--shard": "1/1"}, "--shard needs a --seed"),
+        ({"--shard": "0/2", "--seed": "1"}, "there is no shard 0/2: shard i/k has i from 1 to k"),
+        ({"--shard": "3/2", "--seed": "1"}, "there is no shard 3/2"),
+        ({"--shard": "1", "--seed": "1"}, "'1' is no shard: write for instance 1/4"),
         ({"--threads": "0"}, "0 threads can't make muons"),
         ({"--threads": "-2"}, "-2 threads can't make muons"),
         ({"--threads": "two"}, "'two' is not a valid integer"),

@@ -5,6 +5,7 @@ import threading
 from contextlib import closing
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -16,6 +17,7 @@ from deepmuon_runtime import (
     Generator,
     Muons,
     RefusedError,
+    Shard,
     read_attributes,
     read_muons,
 )
@@ -62,6 +64,57 @@ def test_a_muon_is_made_of_its_own_latents(generator, many):
 @given(n=st.integers(0, 300_001))
 def test_a_shorter_run_is_the_beginning_of_a_longer_one(generator, many, n):
     assert are_equal(generator.sample(n, seed=5), many[:n])
+
+
+@settings(deadline=None, max_examples=20)
+@given(first=st.integers(0, 300_001), data=st.data())
+def test_any_part_of_a_run_can_be_made_by_itself(generator, many, first, data):
+    n = data.draw(st.integers(0, len(many) - first))
+    assert are_equal(generator.sample(n, seed=5, first=first), many[first : first + n])
+    assert are_equal(
+        Muons.concatenate([Muons.empty(0), *generator.chunks(n, seed=5, first=first)]), many[first : first + n]
+    )
+
+
+@pytest.mark.parametrize("first", [10**10 + 7, 2**53 - 1000])
+def test_muons_far_away_are_made_of_their_own_latents(generator, first):
+    per_draw = generator.model.muons_per_draw
+    draw, skipped = divmod(first, per_draw)
+    draws = -(-(skipped + 1000) // per_draw)
+    l0 = latents(5, draw, draws, 4 * per_draw).reshape(-1, 4)[skipped : skipped + 1000, 0]
+    np.testing.assert_allclose(generator.sample(1000, seed=5, first=first).kinetic_energy, np.exp(3 * l0), rtol=1e-5)
+
+
+@pytest.mark.parametrize("of", [1, 2, 3, 7])
+def test_the_shards_joined_are_the_single_run(generator, many, tmp_path, of):
+    """Bit by bit, each shard made with another number of threads."""
+    count = 0
+    for number in range(1, of + 1):
+        path = tmp_path / f"{number}.h5"
+        other = opened(tmp_path, tiny_model(generator.model.muons_per_draw), threads=1 + number % 3)
+        other.write(path, len(many), seed=5, shard=Shard(number, of))
+        part, found = read_muons(path), read_attributes(path)
+        assert are_equal(part, many[count : count + len(part)])
+        assert (found["first"], found["count"], found["total"]) == (count, len(part), len(many))
+        assert found["shard"] == f"{number}/{of}"
+        assert found["live_time_s_m2"] == len(part) / 55.5
+        count += len(part)
+    assert count == len(many)
+
+
+def test_a_shard_is_stored_in_chunks_as_large_as_those_of_the_single_run(model_file, tmp_path):
+    generator = Generator.open(file=model_file)
+    for shard in (Shard(1, 1), Shard(2, 3)):
+        generator.write(tmp_path / "muons.h5", 900_000, seed=5, shard=shard, overwrite=True)
+        with h5py.File(tmp_path / "muons.h5") as file:
+            assert file["muons/u"].chunks == (1 << 17,)
+
+
+def test_there_may_be_more_shards_than_muons(generator, many, tmp_path):
+    generator.write(tmp_path / "none.h5", 3, seed=5, shard=Shard(1, 7))
+    assert len(read_muons(tmp_path / "none.h5")) == 0
+    generator.write(tmp_path / "one.h5", 3, seed=5, shard=Shard(7, 7))
+    assert are_equal(read_muons(tmp_path / "one.h5"), many[2:3])
 
 
 @pytest.mark.parametrize("threads", [1, 2, 3, 7])
@@ -129,6 +182,7 @@ def test_a_model_without_a_rate_gives_files_without_live_time(tmp_path):
 def test_no_muons_are_muons_too(generator, tmp_path):
     assert len(generator.sample(0)) == 0
     assert list(generator.chunks(0)) == []
+    assert list(generator.chunks(0, first=7)) == []
     generator.write(tmp_path / "muons.h5", 0)
     assert len(read_muons(tmp_path / "muons.h5")) == 0
 
@@ -147,6 +201,14 @@ def test_a_number_that_is_none_is_refused(model_file, tmp_path, n):
         with pytest.raises(RefusedError, match="is no number of muons"):
             refused(n)
     assert not (tmp_path / "m.h5").exists()
+
+
+@pytest.mark.parametrize(("n", "first"), [(1, -1), (1, 0.5), (1, 2**53), (2**53, 1), (0, float("nan"))])
+def test_muons_beyond_the_numbers_there_are_are_refused(model_file, n, first):
+    generator = Generator.open(file=model_file)
+    for refused in (generator.sample, generator.chunks):
+        with pytest.raises(RefusedError, match=r"is no number of a first muon|end after number 2\^53"):
+            refused(n, first=first)
 
 
 @pytest.mark.parametrize("seed", [-1, 2**64])

@@ -1,0 +1,82 @@
+"""`deepmuon-check`: whether a muon file can be trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+import click
+
+from deepmuon_cli.ending import DEFECTIVE
+from deepmuon_cli.isolation import run_isolated, show_life
+
+if TYPE_CHECKING:  # the libraries are imported when they are needed: --help is answered at once
+    from deepmuon_runtime.check import Report
+
+__all__ = ["check", "main"]
+
+NAME = "deepmuon-check"
+
+
+@click.command(name=NAME, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.argument("file", type=click.Path(path_type=Path))
+@click.version_option(package_name="deepmuon-runtime", prog_name=NAME, message="%(prog)s %(version)s")
+@click.pass_context
+def check(context: click.Context, file: Path) -> None:
+    """Check a muon file: its format, its attributes and each of its muons.
+
+    \b
+        deepmuon-check muons.h5
+
+    Prints a summary, and a line for each kind of defect with the first muon that has it, counted from 0 in the
+    file. A model's muons must lie in its range of energy if it is a released one; of other muons the energy
+    must be above 0. What a file says of itself can be false without being a defect: nothing here proves who wrote it.
+
+    Exit codes: 0 no defect, 3 a defect, 2 can't be read as a muon file.
+    """  # noqa: D301 - click looks for the character \b
+    from deepmuon_runtime.check import check_file
+
+    report = check_file(file, progress=lambda _: show_life())
+    click.echo(f"{file}: {report.examined:,} muons examined")
+    for name, value in _summary(report):
+        click.echo(f"  {name:20}{value}")
+    for defect in report.defects:
+        click.echo(f"defect: {defect}")
+    click.echo(f"{len(report.defects) or 'no'} defect{'' if len(report.defects) == 1 else 's'} found")
+    if report.defects:
+        context.exit(DEFECTIVE)
+
+
+def main() -> NoReturn:
+    """Run `deepmuon-check`."""
+    run_isolated(check, NAME)
+
+
+def _summary(report: Report) -> Iterator[tuple[str, str]]:
+    """Yield names and values of what is known."""
+    known = report.attributes
+    if "depth_m" in known and "medium" in known:
+        yield "depth", f"{known['depth_m']:g} m of {known['medium']}"
+    if report.examined:
+        yield "mean kinetic energy", f"{report.mean_energy:.4g} GeV"
+        yield "mean cos zenith", f"{report.mean_cos_zenith:.4f}"
+    if report.mu_minus:
+        yield "mu+ / mu-", f"{report.mu_plus / report.mu_minus:.4f}"
+    if "rate_hz_per_m2" in known:
+        uncertainty = known.get("rate_uncertainty_hz_per_m2")
+        error = "" if uncertainty is None else f" +- {uncertainty:.2g}"
+        yield "rate", f"{known['rate_hz_per_m2']:.2f}{error} per m2 and s"
+    if "live_time_s_m2" in known:
+        yield "live time", f"{known['live_time_s_m2']:,.1f} s for 1 m2"
+    if "seed" in known:
+        yield "seed", f"{known['seed']}"
+    if {"shard", "first", "total"} <= known.keys():
+        yield "shard", f"{known['shard']}, from muon {known['first']:,} of {known['total']:,}"
+    if "model_sha256" in known:
+        released = "none of the released ones" if report.model is None else f"the released {report.model.name}"
+        yield "model", f"{released}, SHA-256 {known['model_sha256']}"
+
+
+if __name__ == "__main__":
+    main()

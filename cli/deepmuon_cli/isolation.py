@@ -1,0 +1,59 @@
+"""A command in a process of its own, for what a library may do to its process when a file is damaged.
+
+HDF5 ends the process by a segmentation fault, or computes for ever, on some damaged files.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import sys
+from types import FrameType
+from typing import NoReturn
+
+import click
+
+from deepmuon_cli.ending import REFUSED, SIGNALS, run
+
+__all__ = ["run_isolated", "show_life"]
+
+PATIENCE = 10.0  # s of computing
+
+
+def run_isolated(command: click.Command, name: str) -> NoReturn:
+    """Run a command as `deepmuon_cli.ending.run` does, but a command that is ended by a signal has refused its input.
+
+    The command has to call `show_life` from time to time. Call this before any thread starts.
+
+    Parameters
+    ----------
+    command, name
+        As for `deepmuon_cli.ending.run`.
+    """
+    child = os.fork()
+    if child == 0:
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # no memory image for a file that was expected to be damaged
+        show_life()
+        run(command, name)
+
+    def pass_on(number: int, frame: FrameType | None) -> None:
+        os.kill(child, number)
+
+    for number in SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, pass_on)
+    _, status = os.waitpid(child, 0)
+    code = os.waitstatus_to_exitcode(status)
+    if -code in SIGNALS:  # it came before the child was ready for it
+        code = 128 - code
+    elif code < 0:
+        ending = "took no end" if -code == signal.SIGPROF else f"was ended by {signal.Signals(-code).name}"
+        click.echo(f"{name}: the file is damaged so that reading it {ending}", err=True)
+        code = REFUSED
+    sys.exit(code)
+
+
+def show_life() -> None:
+    """Ask for another ten seconds of computing, after which the process is ended by SIGPROF."""
+    signal.setitimer(signal.ITIMER_PROF, PATIENCE)

@@ -1,0 +1,46 @@
+"""`deepmuon-merge`: the shards of a run to one file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NoReturn
+
+import click
+
+from deepmuon_cli.ending import run
+
+__all__ = ["main", "merge"]
+
+NAME = "deepmuon-merge"
+FILE = click.Path(path_type=Path)
+
+
+@click.command(name=NAME, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.argument("shards", type=FILE, nargs=-1, required=True)
+@click.option("-o", "--output", type=FILE, metavar="FILE", required=True, help="The HDF5 file to be written.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing file, once the new one is complete.")
+@click.option("-q", "--quiet", is_flag=True, help="No closing line.")
+@click.version_option(package_name="deepmuon-runtime", prog_name=NAME, message="%(prog)s %(version)s")
+def merge(shards: tuple[Path, ...], output: Path, overwrite: bool, quiet: bool) -> None:
+    """Join the shards of a run to the file that one machine would have written.
+
+    \b
+        deepmuon-merge part-1.h5 part-2.h5 part-3.h5 -o muons.h5
+
+    The files come from `deepmuon-gen --shard`, in any order. Shards of different runs, missing ones, and muons that are
+    in two of them are refused.
+    """  # noqa: D301 - click looks for the character \b
+    from deepmuon_runtime.merge import merge_shards
+
+    number = merge_shards(shards, output, overwrite=overwrite)
+    if not quiet:
+        click.echo(f"{output}: {number:,} muons of {len(shards)} shard{'s' * (len(shards) > 1)}")
+
+
+def main() -> NoReturn:
+    """Run `deepmuon-merge`."""
+    run(merge, NAME)
+
+
+if __name__ == "__main__":
+    main()

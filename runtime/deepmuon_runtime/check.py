@@ -1,0 +1,211 @@
+"""Whether a muon file keeps its format, and whether what it holds are muons."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from deepmuon_runtime.attributes import attribute_defects, is_generated, sound_attributes
+from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.model import Model
+from deepmuon_runtime.muon_file import COLUMNS, READ_ERRORS, check_format, python_value, reason
+from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
+from deepmuon_runtime.physical import POSITIVE_ENERGIES, describe, find_unphysical
+from deepmuon_runtime.released import list_models
+
+__all__ = ["Report", "check_file"]
+
+PIECE = 1 << 17  # muons read at once
+
+
+@dataclass
+class Report:
+    """What a check found.
+
+    Attributes
+    ----------
+    defects : list of str
+        What is wrong, a line each; none if the file is good.
+    attributes : dict
+        The attributes of the format whose values are what they can be.
+    model : Model or None
+        The released model that made the muons, if it was one.
+    examined : int
+        Muons that were read and counted below.
+    mu_plus, mu_minus : int
+        How many of each.
+    mean_energy : float
+        Mean kinetic energy in GeV; NaN if there is none.
+    mean_cos_zenith : float
+        Mean cosine of the zenith angle; NaN if there is none.
+    """
+
+    defects: list[str] = field(default_factory=list)
+    attributes: dict[str, Any] = field(default_factory=dict)
+    model: Model | None = None
+    examined: int = 0
+    mu_plus: int = 0
+    mu_minus: int = 0
+    energy_sum: float = 0.0
+    cos_zenith_sum: float = 0.0
+
+    @property
+    def mean_energy(self) -> float:  # noqa: D102 - above
+        return self.energy_sum / self.examined if self.examined else float("nan")
+
+    @property
+    def mean_cos_zenith(self) -> float:  # noqa: D102 - above
+        return self.cos_zenith_sum / self.examined if self.examined else float("nan")
+
+    def add(self, muons: Muons) -> None:
+        """Count muons."""
+        self.examined += len(muons)
+        self.mu_plus += int(np.count_nonzero(muons.pdg_id == MU_PLUS))
+        self.mu_minus += int(np.count_nonzero(muons.pdg_id == MU_MINUS))
+        with np.errstate(all="ignore"):  # the file may hold anything
+            self.energy_sum += float(muons.kinetic_energy.sum(dtype=float))
+            self.cos_zenith_sum += float(muons.cos_zenith.sum(dtype=float))
+
+
+def check_file(path: str | Path, progress: Callable[[int], object] | None = None) -> Report:
+    """Check a muon file against its format, and each of its muons.
+
+    The muons are read in pieces: the memory needed does not grow with their number. HDF5 can end the process, or
+    never return, on a damaged file; the command `deepmuon-check` survives that.
+
+    Parameters
+    ----------
+    path
+        A muon file, format version 1.
+    progress
+        Called after each piece with the number of muons read since the last call.
+
+    Raises
+    ------
+    RefusedError
+        If the file can't be opened, or is no muon file of this version.
+    """
+    if Path(path).exists() and not Path(path).is_file():  # a pipe would be waited for
+        raise RefusedError(f"{path} is no file")
+    try:
+        with h5py.File(path, "r") as file:
+            check_format(file, path)
+            return _report(file, progress)
+    except READ_ERRORS as error:
+        raise RefusedError(f"{path} can't be read as a muon file: {reason(error)}") from error
+
+
+def _report(file: h5py.File, progress: Callable[[int], object] | None) -> Report:
+    report = Report()
+    group = _member(file, "muons")
+    if not isinstance(group, h5py.Group):
+        report.defects.append("there is no group /muons")
+        return report
+    attributes = _read_attributes(group, "/muons", report.defects)
+    if is_generated(attributes):
+        report.model = _released_model(attributes.get("model_sha256"))
+    report.attributes = sound_attributes(attributes)
+    report.defects += attribute_defects(attributes, report.model)
+    columns = _sound_columns(group, report.attributes.get("count"), report.defects)
+    if len(columns) == len(COLUMNS) and len({len(column) for column in columns.values()}) == 1:
+        _examine_muons(columns, report, progress)
+    else:
+        report.defects.append("the muons were not examined, because the columns are not sound")
+    return report
+
+
+def _member(group: h5py.Group, name: str) -> h5py.Group | h5py.Dataset | None:
+    """Return what a group holds under a name in the same file: a link to another one is not followed."""
+    try:
+        return None if isinstance(group.get(name, getlink=True), h5py.ExternalLink) else group.get(name)
+    except READ_ERRORS:
+        return None
+
+
+def _read_attributes(node: h5py.HLObject, name: str, defects: list[str]) -> dict[str, Any]:
+    try:
+        return {key: python_value(value) for key, value in node.attrs.items()}
+    except READ_ERRORS as error:
+        defects.append(f"the attributes of {name} can't be read: {reason(error)}")
+        return {}
+
+
+def _released_model(sha256: object) -> Model | None:
+    return next((model for model in list_models() if model.sha256 == sha256), None)
+
+
+def _sound_columns(group: h5py.Group, count: int | None, defects: list[str]) -> dict[str, h5py.Dataset]:
+    """Return the columns that can be read as the format's, and note the defects of all."""
+    sound = {}
+    for name in COLUMNS:
+        column = _member(group, name)
+        if not isinstance(column, h5py.Dataset):
+            defects.append(f"the column {name} is missing")
+            continue
+        try:
+            found = list(_column_defects(column, name))
+        except READ_ERRORS as error:
+            found = [f"can't be read: {reason(error)}"]
+        if not found:
+            sound[name] = column
+        if not found and count is not None and len(column) != count:
+            found = [f"has {len(column)} muons, and the attribute count is {count}"]
+        if (units := _read_attributes(column, name, defects).get("units")) != COLUMNS[name][1]:
+            found.append(f"has the units {units!r}, and should have {COLUMNS[name][1]!r}")
+        defects += (f"the column {name} {defect}" for defect in found)
+    return sound
+
+
+def _column_defects(column: h5py.Dataset, name: str) -> Iterator[str]:
+    """Yield what keeps a column from being read."""
+    dtype = COLUMNS[name][0]
+    if column.dtype != dtype or column.ndim != 1:
+        yield f"is {column.dtype} of shape {column.shape}, and should be {dtype} of one dimension"
+    elif column.is_virtual or column.external:
+        yield "keeps its numbers in other files"
+    elif column.chunks is None:
+        if column.id.get_storage_size() != column.nbytes:
+            yield f"holds {column.id.get_storage_size()} of its {column.nbytes} bytes"
+    elif column.id.get_num_chunks() != -(-len(column) // column.chunks[0]):
+        yield f"holds {column.id.get_num_chunks()} of its {-(-len(column) // column.chunks[0])} chunks"
+
+
+def _examine_muons(columns: dict[str, h5py.Dataset], report: Report, progress: Callable[[int], object] | None) -> None:
+    """Read all muons and note, for each fault, the first that has it and how many have."""
+    model = report.model
+    energies = POSITIVE_ENERGIES if model is None else (model.energy_min_gev, model.energy_max_gev)
+    faults: dict[str, _Fault] = {}
+    total = len(columns["pdg_id"])
+    for first in range(0, total, PIECE):
+        span = slice(first, min(first + PIECE, total))
+        try:
+            muons = Muons(**{name: column[span] for name, column in columns.items()})
+        except READ_ERRORS as error:
+            report.defects.append(f"the muons from {first} on can't be read: {reason(error)}")
+            break
+        report.add(muons)
+        for fault, bad in find_unphysical(muons, *energies).items():
+            index = int(np.argmax(bad))
+            known = faults.setdefault(fault, _Fault(first + index, describe(muons, index)))
+            known.count += int(np.count_nonzero(bad))
+        if progress is not None:
+            progress(len(muons))
+    report.defects += (f"muon {known.first} {fault} ({known.muon}){known.others}" for fault, known in faults.items())
+
+
+@dataclass
+class _Fault:
+    """What is wrong with some muons."""
+
+    first: int
+    muon: str
+    count: int = 0
+
+    @property
+    def others(self) -> str:
+        return f"; so {self.count} muons" if self.count > 1 else ""

@@ -1,0 +1,359 @@
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import sysconfig
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from support.tiny_models import release, tiny_model
+
+from deepmuon_runtime import Generator, Muons, write_muons
+
+COMMAND = Path(sysconfig.get_path("scripts")) / "deepmuon-check"
+MANY = Path(__file__).parents[1] / "support" / "check_many.py"
+MUONS = 1000
+
+
+@pytest.fixture(scope="module")
+def environment(tmp_path_factory):
+    """Variables of a process for which the small model is a released one."""
+    folder = tmp_path_factory.mktemp("released")
+    release(folder, {"quantile-10m.onnx": tiny_model()})
+    return {**os.environ, "PYTHONPATH": str(folder)}
+
+
+@pytest.fixture
+def check(environment):
+    """Run the installed command: exit code, lines of stdout, stderr."""
+
+    def run(path: object) -> tuple[int, list[str], str]:
+        done = subprocess.run([COMMAND, str(path)], env=environment, capture_output=True, text=True, timeout=60)
+        return done.returncode, done.stdout.splitlines(), done.stderr
+
+    return run
+
+
+@pytest.fixture
+def good_file(tmp_path, model_file) -> Path:
+    path = tmp_path / "muons.h5"
+    Generator.open(file=model_file, device="cpu").write(path, MUONS, seed=7)
+    return path
+
+
+def defects(lines: list[str]) -> list[str]:
+    return [line.removeprefix("defect: ") for line in lines if line.startswith("defect: ")]
+
+
+def test_a_good_file_is_summed_up(check, good_file):
+    code, lines, err = check(good_file)
+    assert (code, err) == (0, "")
+    with h5py.File(good_file) as file:
+        energy, w, pdg_id = (file["muons"][name][:].astype(float) for name in ("kinetic_energy", "w", "pdg_id"))
+        sha256 = file["muons"].attrs["model_sha256"]
+    assert lines == [
+        f"{good_file}: 1,000 muons examined",
+        "  depth               10 m of G4_WATER",
+        f"  mean kinetic energy {energy.mean():.4g} GeV",
+        f"  mean cos zenith     {-w.mean():.4f}",
+        f"  mu+ / mu-           {(pdg_id == -13).sum() / (pdg_id == 13).sum():.4f}",
+        "  rate                55.50 +- 0.1 per m2 and s",
+        "  live time           18.0 s for 1 m2",
+        "  seed                7",
+        "  shard               1/1, from muon 0 of 1,000",
+        f"  model               the released quantile-10m.onnx, SHA-256 {sha256}",
+        "no defects found",
+    ]
+
+
+def test_a_model_of_ones_own_is_no_defect_and_named_as_such(check, tmp_path):
+    model = tmp_path / "own.onnx"
+    model.write_bytes(tiny_model(metadata={"depth_m": "12.5", "rate_hz_per_m2": None}))
+    Generator.open(file=model).write(tmp_path / "muons.h5", 10)
+    code, lines, _ = check(tmp_path / "muons.h5")
+    assert code == 0
+    assert "  depth               12.5 m of G4_WATER" in lines
+    assert any(line.startswith("  model               none of the released ones, SHA-256 ") for line in lines)
+
+
+def test_muons_of_other_origin_are_checked_too(check, tmp_path):
+    one = np.ones(3)
+    muons = Muons.of(1e6 * one, 0 * one, 0 * one, -one, [13, -13, 13])
+    about = {"depth_m": 0.0, "medium": "G4_WATER", "source": "a test", "provenance": ["made up"]}
+    write_muons(tmp_path / "muons.h5", muons, about)
+    assert check(tmp_path / "muons.h5")[0] == 0
+
+
+@pytest.mark.parametrize("n", [0, 1, 300_000])
+def test_any_number_of_muons_is_good(check, tmp_path, model_file, n):
+    Generator.open(file=model_file).write(tmp_path / "muons.h5", n, seed=1)
+    code, lines, _ = check(tmp_path / "muons.h5")
+    assert (code, lines[0]) == (0, f"{tmp_path}/muons.h5: {n:,} muons examined")
+
+
+Damage = Callable[[h5py.Group], None]
+
+
+def set_muon(column: str, index: int, value: float) -> Damage:
+    def damage(muons: h5py.Group) -> None:
+        muons[column][index] = value
+
+    return damage
+
+
+def set_attribute(name: str, value: object) -> Damage:
+    def damage(muons: h5py.Group) -> None:
+        muons.attrs[name] = value
+
+    return damage
+
+
+def delete_attribute(name: str) -> Damage:
+    return lambda muons: muons.attrs.__delitem__(name)
+
+
+def replace_column(name: str, **description: object) -> Damage:
+    def damage(muons: h5py.Group) -> None:
+        del muons[name]
+        muons.create_dataset(name, **description).attrs["units"] = "1"
+
+    return damage
+
+
+def shorten(muons: h5py.Group) -> None:
+    muons["u"].resize((MUONS - 1,))
+
+
+def shorten_all(muons: h5py.Group) -> None:
+    for column in muons.values():
+        column.resize((MUONS - 1,))
+
+
+def take_units(muons: h5py.Group) -> None:
+    del muons["kinetic_energy"].attrs["units"]
+
+
+def delete_column(muons: h5py.Group) -> None:
+    del muons["w"]
+
+
+def group_for_a_column(muons: h5py.Group) -> None:
+    del muons["w"]
+    muons.create_group("w")
+
+
+def link_to_another_file(muons: h5py.Group) -> None:
+    del muons["v"]
+    muons["v"] = h5py.ExternalLink("other.h5", "/muons/v")
+
+
+def virtual_column(muons: h5py.Group) -> None:
+    layout = h5py.VirtualLayout((MUONS,), "<f4")
+    layout[:] = h5py.VirtualSource("other.h5", "/muons/v", (MUONS,))
+    del muons["v"]
+    muons.create_virtual_dataset("v", layout).attrs["units"] = "1"
+
+
+def several(muons: h5py.Group) -> None:
+    muons["kinetic_energy"][3] = -1
+    muons["w"][5:8] = np.nan
+    del muons.attrs["seed"]
+
+
+@pytest.mark.parametrize(
+    ("damage", "expected"),
+    [
+        (set_muon("kinetic_energy", 17, np.nan), ["muon 17 has a kinetic energy outside 0.01 to 100 GeV"]),
+        (set_muon("kinetic_energy", 0, np.inf), ["muon 0 has a kinetic energy outside"]),
+        (set_muon("kinetic_energy", 999, 0), ["muon 999 has a kinetic energy outside"]),
+        (set_muon("kinetic_energy", 17, 100.1), ["muon 17 has a kinetic energy outside 0.01 to 100 GeV"]),
+        (set_muon("u", 17, np.nan), ["muon 17 has a direction whose length is not 1"]),
+        (set_muon("v", 17, 1e30), ["muon 17 has a direction whose length is not 1"]),
+        (set_muon("pdg_id", 17, 0), ["muon 17 has a charge other than -1 and +1"]),
+        (set_muon("pdg_id", 17, 11), ["muon 17 has a charge other than -1 and +1"]),
+        (lambda muons: muons["w"].write_direct(-muons["w"][:]), ["muon 0 does not go down"]),
+        (
+            several,
+            ["attribute seed is missing", "muon 3 has a kinetic energy", "muon 5 has a direction", "muon 5 does"],
+        ),
+        (shorten, ["column u has 999 muons, and the attribute count is 1000", "muons were not examined"]),
+        (shorten_all, [f"column {name} has 999 muons" for name in ("kinetic_energy", "u", "v", "w", "pdg_id")]),
+        (delete_column, ["column w is missing", "muons were not examined"]),
+        (group_for_a_column, ["column w is missing", "muons were not examined"]),
+        (link_to_another_file, ["column v is missing", "muons were not examined"]),
+        (virtual_column, ["column v keeps its numbers in other files", "muons were not examined"]),
+        (replace_column("u", data=np.zeros(MUONS)), ["column u is float64 of shape", "muons were not examined"]),
+        (replace_column("u", data=np.zeros(MUONS, ">f4")), ["column u is >f4 of shape", "muons were not examined"]),
+        (replace_column("u", data=np.zeros((MUONS, 1), "f4")), ["u is float32 of shape (1000, 1)", "not examined"]),
+        (replace_column("u", shape=MUONS, dtype="f4"), ["column u holds 0 of its 4000 bytes", "not examined"]),
+        (
+            replace_column("u", shape=MUONS, dtype="f4", chunks=(100,)),
+            ["column u holds 0 of its 10 chunks", "muons were not examined"],
+        ),
+        (take_units, ["column kinetic_energy has the units None, and should have 'GeV'"]),
+        (set_attribute("count", 1001), ["live_time_s_m2", "numbers 0 to 1001"] + 5 * ["has 1000 muons, and the"]),
+        (delete_attribute("medium"), ["attribute medium is missing", "that of its model quantile-10m.onnx"]),
+        (set_attribute("live_time_s_m2", 20.0), ["attribute live_time_s_m2 is 20.0, and count / rate_hz_per_m2"]),
+        (set_attribute("depth_m", 11.0), ["attribute depth_m is 11.0, and that of its model quantile-10m.onnx is 10"]),
+        (set_attribute("shard", "1/2"), ["numbers 0 to 1000 (without the end) of 1000 by first"]),
+        (set_attribute("created", "now\nor never\x1b[2J"), ["attribute created is 'now\\nor never\\x1b[2J', and"]),
+        (lambda muons: muons.file.__delitem__("muons"), ["there is no group /muons"]),
+    ],
+)
+def test_each_defect_is_named_in_a_line_with_its_first_muon(check, good_file, damage, expected):
+    with h5py.File(good_file, "r+") as file:
+        damage(file["muons"])
+    code, lines, err = check(good_file)
+    assert (code, err) == (3, "")
+    found = defects(lines)
+    assert [part for part in expected if not any(part in line for line in found)] == []
+    assert len(found) == len(expected)
+    assert lines[-1] == f"{len(found)} defect{'s' * (len(found) > 1)} found"
+
+
+def test_a_defect_far_inside_is_counted_and_numbered_from_the_beginning(check, tmp_path, model_file):
+    path = tmp_path / "muons.h5"
+    Generator.open(file=model_file).write(path, 300_000, seed=1)
+    with h5py.File(path, "r+") as file:
+        file["muons/pdg_id"][200_000:270_000] = 1
+    code, lines, _ = check(path)
+    assert code == 3
+    (defect,) = defects(lines)
+    assert defect.startswith("muon 200000 has a charge other than -1 and +1 (kinetic energy ")
+    assert defect.endswith("; so 70000 muons")
+
+
+@pytest.mark.parametrize("how", ["missing", "folder", "pipe", "empty", "text", "other HDF5", "later version"])
+def test_what_is_no_muon_file_is_refused_in_one_line(check, tmp_path, how):
+    path = tmp_path / "muons.h5"
+    if how == "folder":
+        path.mkdir()
+    elif how == "pipe":
+        os.mkfifo(path)
+    elif how in ("empty", "text"):
+        path.write_text("" if how == "empty" else "no HDF5")
+    elif how != "missing":
+        with h5py.File(path, "w") as file:
+            file["numbers"] = 1
+            if how == "later version":
+                file.attrs.update({"format": "deepmuon-muons", "format_version": 2})
+    code, lines, err = check(path)
+    assert (code, lines) == (2, [])
+    assert err.startswith("deepmuon-check: ")
+    assert err.count("\n") == 1
+
+
+def test_a_compressed_file_is_good(check, good_file):
+    with h5py.File(good_file, "r+") as file:
+        for name, column in list(file["muons"].items()):
+            numbers, units = column[:], column.attrs["units"]
+            del file["muons"][name]
+            file["muons"].create_dataset(name, data=numbers, compression="gzip").attrs["units"] = units
+    assert check(good_file)[0] == 0
+
+
+def wait_until_read(path: Path, parent: int) -> None:
+    """Wait until the child of a process has opened a file."""
+    end = time.monotonic() + 60
+    opened: set[str] = set()
+    while str(path) not in opened:
+        assert time.monotonic() < end
+        time.sleep(0.01)
+        for child in Path(f"/proc/{parent}/task/{parent}/children").read_text().split():
+            for link in Path(f"/proc/{child}/fd").iterdir():
+                with contextlib.suppress(FileNotFoundError):  # closed meanwhile
+                    opened.add(os.readlink(link))
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)], ids=["Ctrl-C", "SIGTERM"])
+def test_a_check_can_be_stopped(environment, tmp_path, number, code):
+    """The file is a large one full of one muon, which compression makes small."""
+    path = tmp_path / "muons.h5"
+    n = 200_000_000
+    with h5py.File(path, "w") as file:
+        file.attrs.update({"format": "deepmuon-muons", "format_version": 1})
+        group = file.create_group("muons")
+        for name, value in {"kinetic_energy": 1, "u": 0, "v": 0, "w": -1, "pdg_id": 13}.items():
+            dtype = "i1" if name == "pdg_id" else "f4"
+            column = group.create_dataset(name, (n,), dtype, chunks=(1 << 22,), compression="gzip")
+            column[: 1 << 22] = np.full(1 << 22, value, dtype)
+            content = column.id.read_direct_chunk((0,))[1]
+            for first in range(1 << 22, n, 1 << 22):
+                column.id.write_direct_chunk((first,), content)
+    process = subprocess.Popen([COMMAND, path], env=environment, stderr=subprocess.PIPE, text=True)
+    wait_until_read(path, process.pid)
+    process.send_signal(number)
+    _, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (code, f"deepmuon-check: stopped by {number.name}\n")
+
+
+def codes(paths: Iterable[Path], environment: dict[str, str]) -> Counter[int]:
+    """Count the exit codes of checks, each in a process of its own."""
+    done = subprocess.run(
+        [sys.executable, MANY],
+        input="\n".join(map(str, paths)),
+        env={**environment, "OPENBLAS_NUM_THREADS": "1"},  # no thread may run when a process forks
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return Counter(map(int, done.stdout.split()))
+
+
+@pytest.fixture
+def endings(environment, tmp_path):
+    """Check contents as files, and count the exit codes."""
+
+    def run(contents: Iterable[bytes]) -> Counter[int]:
+        paths = []
+        for number, content in enumerate(contents):
+            paths.append(tmp_path / f"damaged-{number}.h5")
+            paths[-1].write_bytes(content)
+        return codes(paths, environment)
+
+    return run
+
+
+def test_no_truncated_file_passes_or_ends_the_check(endings, good_file):
+    """200 lengths."""
+    content = good_file.read_bytes()
+    lengths = np.random.default_rng(1).integers(len(content), size=200)
+    assert endings(content[:length] for length in lengths) == {2: 200}
+
+
+def bytes_of_no_column(path: Path) -> np.ndarray:
+    """Return the positions of the bytes that say where the columns are and what they mean."""
+    is_free = np.ones(path.stat().st_size, bool)
+    with h5py.File(path) as file:
+        for column in file["muons"].values():
+            for number in range(column.id.get_num_chunks()):
+                chunk = column.id.get_chunk_info(number)
+                is_free[chunk.byte_offset : chunk.byte_offset + chunk.size] = False
+    return np.flatnonzero(is_free)
+
+
+@pytest.mark.parametrize("where", ["anywhere", "in what describes the columns"])
+def test_random_bytes_never_end_the_check_by_a_signal_or_without_end(endings, good_file, where):
+    """250 files in each place, 1 to 8 bytes each. Without the process of its own a few of them end it by SIGSEGV."""
+    random = np.random.default_rng(2)
+    content = np.frombuffer(good_file.read_bytes(), np.uint8)
+    positions = np.arange(len(content)) if where == "anywhere" else bytes_of_no_column(good_file)
+
+    def damaged() -> bytes:
+        copy = content.copy()
+        hit = random.choice(positions, random.integers(1, 9))
+        copy[hit] = random.integers(256, size=len(hit))
+        return copy.tobytes()
+
+    found = endings(damaged() for _ in range(250))
+    assert found.keys() <= {0, 2, 3}
+    assert found[2] > 0
+    assert found[3] > 50
