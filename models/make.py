@@ -3,8 +3,8 @@
     python models/make.py --cry cry_sea_level.h5 --work work
 
 Steps whose result lies in the work folder are not repeated, and an interrupted fit goes on from its checkpoint.
-On two free cores: 5 minutes to carry the muons through water, 15 for each `quantile` and 25 for each `transformer`
-model, 4 to evaluate one.
+On two cores: 10 minutes to carry the muons through water, 4 for each `quantile` and 25 for each `transformer` model,
+and 2 to evaluate one.
 """
 
 from __future__ import annotations
