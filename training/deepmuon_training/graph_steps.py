@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from onnx import TensorProto
 
 from deepmuon_training.graph import Graph
 from deepmuon_training.preprocessing import LAMBDA, MEV_PER_GEV
@@ -13,9 +14,12 @@ __all__ = [
     "LARGEST_LATENT",
     "bilinear",
     "bilinear_cells",
+    "charge_sign",
     "columns",
     "interpolation_cells",
     "kinetic_energy",
+    "linear",
+    "locate",
     "matrix",
     "on_plane",
     "place",
@@ -93,6 +97,23 @@ def bilinear(table: torch.Tensor, i: torch.Tensor, a: torch.Tensor, j: torch.Ten
     upper = table[i, j] + b * (table[i, j + 1] - table[i, j])
     lower = table[i + 1, j] + b * (table[i + 1, j + 1] - table[i + 1, j])
     return upper + a * (lower - upper)
+
+
+def locate(value: torch.Tensor, scale: float) -> tuple[torch.Tensor, torch.Tensor]:
+    """Evaluate in PyTorch what `place` does; the cell is a whole number."""
+    position = value * scale
+    floor = torch.floor(position)
+    return floor.long(), position - floor
+
+
+def linear(table: torch.Tensor, cell: torch.Tensor, inside: torch.Tensor) -> torch.Tensor:
+    """Evaluate in PyTorch what `interpolation_cells` is for."""
+    return table[cell] + inside * (table[cell + 1] - table[cell])
+
+
+def charge_sign(g: Graph, latent: str, threshold: str) -> str:
+    """Return +1 where the latent is below its threshold 2 P(mu+) - 1, else -1: int8, cast last."""
+    return g("Cast", g("Where", g("Less", latent, threshold), 1.0, -1.0), to=TensorProto.INT8)
 
 
 def _cut(g: Graph, table: str, axis: int, start: int, stop: int) -> str:

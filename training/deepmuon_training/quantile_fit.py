@@ -67,14 +67,8 @@ def fit_quantile(
     schedules = schedules or QuantileSchedules()
     energy = muons.kinetic_energy.astype(np.float64)
     transform = EnergyTransform.fit(muons.kinetic_energy)
-
     charge = fit_charge(
-        muons,
-        transform,
-        seed=seed,
-        schedule=schedules.charge,
-        checkpoint=checkpoint,
-        progress=progress,
+        muons, transform, seed=seed, schedule=schedules.charge, checkpoint=checkpoint, progress=progress
     )
     tails = PowerLawTails.fit(energy, energy_min=MINIMUM_ENERGY, energy_max=ENERGY_MAX)
     torch.manual_seed(seed)

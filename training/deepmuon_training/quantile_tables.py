@@ -30,9 +30,12 @@ from deepmuon_training.graph_steps import (
     LARGEST_LATENT,
     bilinear,
     bilinear_cells,
+    charge_sign,
     columns,
     interpolation_cells,
     kinetic_energy,
+    linear,
+    locate,
     matrix,
     on_plane,
     place,
@@ -88,14 +91,13 @@ class QuantileTables:
         latent = latent.clamp(-LARGEST_LATENT, LARGEST_LATENT)
         l0, l1, l2, l3, l4 = latent.unbind(dim=1)
         t = -torch.sign(l0) * torch.log((1 - l0.abs()) + _FINE_STEP * l1)
-        cell, inside = _locate(t, _ENERGY_KNOTS, _ENERGY_REACH)
-        energy = torch.from_numpy(self.energy)
-        x = energy[cell] + inside * (energy[cell + 1] - energy[cell])
-        row, row_inside = _locate(t.clamp(-_ROW_LIMIT, _ROW_LIMIT), _ROWS, _ROW_REACH)
+        cell, inside = locate(t, _ENERGY_KNOTS / _ENERGY_REACH)
+        x = linear(torch.from_numpy(self.energy), cell + _ENERGY_KNOTS, inside)
+        row, a = locate(t.clamp(-_ROW_LIMIT, _ROW_LIMIT), _ROWS / _ROW_REACH)
         tail = 1 - l2.abs()
-        column, column_inside = _locate(torch.sign(l2) * torch.log((2 - tail) / tail), _COLUMNS, _COLUMN_REACH)
+        column, b = locate(torch.sign(l2) * torch.log((2 - tail) / tail), _COLUMNS / _COLUMN_REACH)
         logit, threshold = (
-            bilinear(torch.from_numpy(table), row, row_inside, column, column_inside)
+            bilinear(torch.from_numpy(table), row + _ROWS, a, column + _COLUMNS, b)
             for table in (self.zenith, self.charge)
         )
         odds = torch.exp(-logit)
@@ -126,18 +128,10 @@ class QuantileTables:
         coefficients = columns(g, g("Gather", bilinear_cells(g, self.zenith, self.charge), cell), 8)
         logit, threshold = (on_plane(g, coefficients[k : k + 4], a, b) for k in (0, 4))
         direction = _direction(g, logit, l3)
-        charge = g("Cast", g("Where", g("Less", l4, threshold), 1.0, -1.0), to=TensorProto.INT8)
-        return g, energy, direction, charge
+        return g, energy, direction, charge_sign(g, l4, threshold)
 
 
 _ROW_LIMIT = _ROW_REACH * (1 - 1e-4)  # inside the last cell
-
-
-def _locate(value: torch.Tensor, knots: int, reach: float) -> tuple[torch.Tensor, torch.Tensor]:
-    """Cell of each value in an even table of 2 knots + 1 over -reach .. reach, and the place in it, 0 to 1."""
-    position = value * (knots / reach)
-    floor = torch.floor(position)
-    return floor.long() + knots, position - floor
 
 
 def tabulate(generator: QuantileGenerator) -> QuantileTables:
@@ -202,9 +196,10 @@ def table_error(generator: QuantileGenerator, tables: QuantileTables, *, seed: i
     with torch.no_grad():
         found_energy, direction, _ = tables(latent)
         tail = 1 - latent[:, 0].abs() + _FINE_STEP * latent[:, 1]
-        y = copy.deepcopy(generator).double().pre_tanh(torch.sign(latent[:, 0]) * torch.log((2 - tail) / tail))
+        double = copy.deepcopy(generator).double()
+        y = double.pre_tanh(torch.sign(latent[:, 0]) * torch.log((2 - tail) / tail))
         level = torch.logit((1 + latent[:, 2:3]) / 2)
-        cos_zenith = torch.sigmoid(copy.deepcopy(generator).double().cos_zenith_logit(level, y))[:, 0]
+        cos_zenith = torch.sigmoid(double.cos_zenith_logit(level, y))[:, 0]
     energy = (found_energy / generator.transform.energy(y) - 1).abs()
     angle = (-direction[:, 2] - cos_zenith).abs()
     return TableError(_rms(energy), float(energy.max()), _rms(angle), float(angle.max()))

@@ -27,9 +27,12 @@ from deepmuon_training.graph_steps import (
     LARGEST_LATENT,
     bilinear,
     bilinear_cells,
+    charge_sign,
     columns,
     interpolation_cells,
     kinetic_energy,
+    linear,
+    locate,
     matrix,
     on_plane,
     place,
@@ -180,11 +183,7 @@ class TransformerModel:
         pre_tanh, x_atanh, y_atanh = values.transpose(0, 1).flatten(1)
         cos_x, cos_y = torch.tanh(x_atanh), torch.tanh(y_atanh)
         radius = torch.sqrt(cos_x**2 + cos_y**2)
-        position = radius * (_RADIUS_KNOTS / _RADIUS_REACH)
-        floor = torch.floor(position)
-        table = torch.from_numpy(self.angle)
-        cell = floor.long()
-        zenith = table[cell] + (position - floor) * (table[cell + 1] - table[cell])
+        zenith = linear(torch.from_numpy(self.angle), *locate(radius, _RADIUS_KNOTS / _RADIUS_REACH))
         stretch = torch.sin(zenith) / radius.clamp(min=_SMALLEST_RADIUS)
         cos_zenith = torch.cos(zenith)
         direction = torch.stack([cos_x * stretch, cos_y * stretch, -cos_zenith], dim=1)
@@ -197,8 +196,7 @@ class TransformerModel:
         rows, cols = table.shape
         row = ((x - self.charge.x_range[0]) * self._row_scale).clamp(0, rows - 1 - 1e-3)
         column = (cos_zenith * (cols - 1)).clamp(0, cols - 1 - 1e-3)
-        i, j = torch.floor(row), torch.floor(column)
-        return bilinear(table, i.long(), row - i, j.long(), column - j)
+        return bilinear(table, *locate(row, 1.0), *locate(column, 1.0))
 
     @property
     def _row_scale(self) -> float:
@@ -221,8 +219,7 @@ class TransformerModel:
         x = g("Add", pre_tanh, self.transform.mean)
         direction, cos_zenith = self._direction_graph(g, g("Tanh", x_atanh), g("Tanh", y_atanh))
         threshold = self._threshold_graph(g, x, cos_zenith)
-        positive = g("Less", g("Reshape", charge_latent, flat), threshold)
-        charge = g("Cast", g("Where", positive, 1.0, -1.0), to=TensorProto.INT8)
+        charge = charge_sign(g, g("Reshape", charge_latent, flat), threshold)
         return g, kinetic_energy(g, x, self.energy_range), direction, charge
 
     def _network_graph(self, g: Graph, noise: str) -> str:
