@@ -1,9 +1,10 @@
 """Makes the released models again, from CRY's muons to ONNX files, cards and manifest.
 
-    python models/make.py --cry cry_sea_level.h5 --work work
+    python models/make.py --cry cry_sea_level.h5 --more-cry cry_40M.h5 --work work
 
+From 30 m on the muons come from a second, larger run of CRY, of which few muons in a hundred get there.
 Steps whose result lies in the work folder are not repeated, and an interrupted fit goes on from its checkpoint.
-On two cores: 10 minutes to carry the muons through water, 4 for each `quantile` and 25 for each `transformer` model,
+On two cores: 40 minutes to carry the muons through water, 4 for each `quantile` and 25 for each `transformer` model,
 and 2 to evaluate one.
 """
 
@@ -47,8 +48,15 @@ RELEASED = REPOSITORY / "models" / "deepmuon_models"
 EVALUATIONS = REPOSITORY / "docs" / "evaluations"
 SEED = 1
 EVALUATED_MUONS = 20_000_000
+DEPTHS = (0, 10, 20, 30, 40, 50)
 LAYER = 10
 """Metres of water between two depths."""
+
+DEEP = 30
+"""From this depth [m] on, the muons come from the larger run of CRY."""
+
+DEEP_ROWS = {"testing": slice(8_000_000), "training": slice(8_000_000, 24_000_000)}
+"""Which muons of the larger run test and train the generators of the deep."""
 
 
 class Made(NamedTuple):
@@ -61,13 +69,16 @@ class Made(NamedTuple):
 
 @click.command(help=__doc__)
 @click.option("--cry", required=True, type=click.Path(exists=True, path_type=Path), help="CRY's muons at sea level.")
+@click.option("--more-cry", type=click.Path(exists=True, path_type=Path), help="More of them, for 30 m and deeper.")
 @click.option("--work", required=True, type=click.Path(path_type=Path), help="Folder for samples and checkpoints.")
-@click.option("--depth", "depths", multiple=True, type=int, default=(0, 10), show_default=True)
+@click.option("--depth", "depths", multiple=True, type=int, default=DEPTHS, show_default=True)
 @click.option("--architecture", "architectures", multiple=True, default=("quantile", "transformer"), show_default=True)
-def main(cry: Path, work: Path, depths: tuple[int, ...], architectures: tuple[str, ...]) -> None:
+def main(cry: Path, more_cry: Path | None, work: Path, depths: tuple[int, ...], architectures: tuple[str, ...]) -> None:
     """Make each model of each depth, then the manifest."""
     torch.set_num_threads(1)  # other numbers of threads round otherwise
     make_sea_level(cry, work)
+    if more_cry and max(depths) >= DEEP:
+        make_deep(cry, more_cry, work)
     for depth in depths:
         for part in ("training", "testing"):
             make_sample(work, part, depth)
@@ -91,11 +102,24 @@ def make_sea_level(cry: Path, work: Path) -> None:
     smooth = StepSmoother(training.muons)
     write_sample(sample_file(work, "testing", 0, "-raw"), testing)
     for part, sample in (("training", training), ("testing", testing)):
-        muons = smooth(sample.muons)
-        kept = muons.kinetic_energy >= MINIMUM_ENERGY
-        what = f"steps of CRY's tables taken out, {np.sum(~kept)} muons moved below 1 MeV dropped"
-        smoothed = sample.then(what, muons=muons[kept], rate=sample.rate * float(np.mean(kept)), smoothed=True)
-        write_sample(sample_file(work, part, 0), smoothed)
+        write_sample(sample_file(work, part, 0), smoothed(sample, smooth))
+
+
+def smoothed(sample: Sample, smooth: StepSmoother) -> Sample:
+    """Take the steps of CRY's tables out."""
+    muons = smooth(sample.muons)
+    kept = muons.kinetic_energy >= MINIMUM_ENERGY
+    what = f"steps of CRY's tables taken out, {np.sum(~kept)} muons moved below 1 MeV dropped"
+    return sample.then(what, muons=muons[kept], rate=sample.rate * float(np.mean(kept)), smoothed=True)
+
+
+def make_deep(cry: Path, more_cry: Path, work: Path) -> None:
+    """Carry muons of the larger run to where the deep begins, smoothed by the maps of the other's training part."""
+    parts = [part for part in DEEP_ROWS if not sample_file(work, part, DEEP).exists()]
+    smooth = StepSmoother(read_cry(cry, slice(-HELD_OUT_CRY_MUONS)).muons) if parts else None
+    for part in parts:
+        sea_level = smoothed(read_cry(more_cry, DEEP_ROWS[part]), smooth)
+        write_sample(sample_file(work, part, DEEP), transport(sea_level, DEEP, seed=transport_seed(part, DEEP)).sample)
 
 
 def make_sample(work: Path, part: str, depth: int) -> None:
@@ -105,8 +129,12 @@ def make_sample(work: Path, part: str, depth: int) -> None:
         return
     make_sample(work, part, depth - LAYER)
     above = read_sample(sample_file(work, part, depth - LAYER))
-    seed = depth + ("training", "testing").index(part)
-    write_sample(path, transport(above, LAYER, seed=seed).sample)
+    write_sample(path, transport(above, LAYER, seed=transport_seed(part, depth)).sample)
+
+
+def transport_seed(part: str, depth: int) -> int:
+    """Return a seed that no other slab has."""
+    return depth + ("training", "testing").index(part)
 
 
 def make_quantile(sample: Sample, folder: Path) -> Made:
