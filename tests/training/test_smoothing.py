@@ -113,3 +113,11 @@ def test_directions_stay_unit_vectors(smoothed):
     length = smoothed.u.astype(float) ** 2 + smoothed.v.astype(float) ** 2 + smoothed.w.astype(float) ** 2
     np.testing.assert_allclose(length, 1, atol=1e-6)
     assert np.all(smoothed.w < 0)
+
+
+@pytest.mark.parametrize("energy", [2e-4, 9e4], ids=["below", "above"])
+def test_a_muon_outside_of_every_fitted_cell_keeps_its_energy(stepped, energy):
+    # Its rank among the fitted ones is 0 or 1, whose quantile lay at 3e14 GeV once.
+    cos_zenith = 0.9
+    muon = Muons.of(np.array([energy]), np.array([np.sqrt(1 - cos_zenith**2)]), [0.0], [-cos_zenith], [13])
+    assert StepSmoother(stepped[stepped.kinetic_energy < 1e4])(muon).kinetic_energy[0] == pytest.approx(energy)

@@ -52,8 +52,10 @@ class _EnergyMap:
         return cls(edges, cumulative)
 
     def __call__(self, x: Float) -> Float:
-        """Move each x [n] inside its cell."""
-        return self._smooth(np.interp(x, self.edges, self.cumulative))
+        """Move each x [n] inside its cell; one outside of all filled cells, whose rank says nothing, stays."""
+        rank = np.interp(x, self.edges, self.cumulative)
+        known = (rank > 0) & (rank < 1)
+        return np.where(known, self._smooth(np.where(known, rank, 0.5)), x)
 
     def quantiles(self, low: float, high: float, count: int) -> Float:
         """Smooth x at evenly spaced ranks between two edges."""
