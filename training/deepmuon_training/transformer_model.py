@@ -210,10 +210,11 @@ class TransformerModel:
         sizes = np.array([LATENTS, d, d], dtype=np.int64)
         noise, charge_latent, keys = g.several("Split", 3, latent, sizes, axis=1)
         order = g.several("TopK", 2, keys, np.array([d], dtype=np.int64), axis=1)[1]
+        order = g("Unsqueeze", order, np.array([2], dtype=np.int64))
         tokens = self._network_graph(g, noise)
         flat = np.array([-1], dtype=np.int64)
         pre_tanh, x_atanh, y_atanh = (
-            g("Reshape", g("GatherElements", token, order, axis=1), flat)
+            g("Reshape", g("GatherND", token, order, batch_dims=1), flat)
             for token in (g("Gather", tokens, np.array(k, dtype=np.int64), axis=1) for k in range(3))
         )
         x = g("Add", pre_tanh, self.transform.mean)
