@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import h5py
@@ -158,3 +158,9 @@ def test_crys_file_and_the_contracts_are_not_mistaken_for_each_other(cry, tmp_pa
         read_cry(tmp_path / "sample.h5")
     with pytest.raises(RefusedError, match="is no muon file"):
         read_sample(cry)
+
+
+def test_a_part_of_a_sample_is_its_muons_with_all_that_is_known_of_them(tmp_path):
+    sample = Sample(MUONS, depth_m=10.0, source="the tests", provenance=("made",), rate=60.5)
+    write_sample(tmp_path / "sample.h5", sample)
+    assert_same(read_sample(tmp_path / "sample.h5", 1, 2), replace(sample, muons=MUONS[1:]))

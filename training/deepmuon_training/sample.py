@@ -77,21 +77,42 @@ class Sample:
         """Return a changed copy whose provenance ends with `what` was done."""
         return replace(self, provenance=(*self.provenance, what), **changes)
 
+    @property
+    def attributes(self) -> dict[str, object]:
+        """What a muon file says of the sample; what is unknown is left out."""
+        attributes = {
+            "depth_m": self.depth_m,
+            "medium": self.medium,
+            "source": self.source,
+            "provenance": list(self.provenance),
+            "rate_hz_per_m2": self.rate,
+            "rate_uncertainty_hz_per_m2": self.rate_uncertainty,
+            "smoothed": self.smoothed,
+        }
+        return {name: value for name, value in attributes.items() if value is not None}
 
-def read_sample(path: str | Path) -> Sample:
-    """Read a sample from a muon file of version 1.
+
+def read_sample(path: str | Path, first: int = 0, count: int | None = None) -> Sample:
+    """Read a sample, or a part of it, from a muon file of version 1.
+
+    Parameters
+    ----------
+    path
+        The file.
+    first, count
+        Which muons, as in `deepmuon_runtime.read_muons`; all if left out.
 
     Raises
     ------
     RefusedError
-        If the file is no such file.
+        If the file is no such file, or does not hold the muons asked for.
     """
     attributes = read_attributes(path)
     rate = attributes.get("rate_hz_per_m2")
     uncertainty = attributes.get("rate_uncertainty_hz_per_m2")
     smoothed = attributes.get("smoothed")
     return Sample(
-        muons=read_muons(path),
+        muons=read_muons(path, first, count),
         depth_m=float(attributes["depth_m"]),
         source=str(attributes.get("source", attributes["created_by"])),
         provenance=tuple(str(line) for line in attributes.get("provenance", ())),
@@ -103,24 +124,14 @@ def read_sample(path: str | Path) -> Sample:
 
 
 def write_sample(path: str | Path, sample: Sample, *, overwrite: bool = False) -> None:
-    """Write a sample as a muon file of version 1; what is unknown is left out.
+    """Write a sample as a muon file of version 1.
 
     Raises
     ------
     RefusedError
         If the file exists (without `overwrite`) or can't be written.
     """
-    attributes = {
-        "depth_m": sample.depth_m,
-        "medium": sample.medium,
-        "source": sample.source,
-        "provenance": list(sample.provenance),
-        "rate_hz_per_m2": sample.rate,
-        "rate_uncertainty_hz_per_m2": sample.rate_uncertainty,
-        "smoothed": sample.smoothed,
-    }
-    known = {name: value for name, value in attributes.items() if value is not None}
-    write_muons(path, sample.muons, known, overwrite=overwrite)
+    write_muons(path, sample.muons, sample.attributes, overwrite=overwrite)
 
 
 def read_cry(path: str | Path, part: slice = slice(None)) -> Sample:
