@@ -15,8 +15,9 @@ from __future__ import annotations
 import signal
 import sys
 import warnings
+from collections.abc import Callable
 from types import FrameType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import click
 
@@ -26,6 +27,8 @@ FAILED = 1
 REFUSED = 2
 DEFECTIVE = 3
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+MOMENT = 0.02  # s, after which a signal that got lost comes again
 
 
 def run(command: click.Command, name: str) -> NoReturn:
@@ -38,11 +41,8 @@ def run(command: click.Command, name: str) -> NoReturn:
     name
         What the user typed to start it.
     """
-    for number in SIGNALS:
-        if signal.getsignal(number) is not signal.SIG_IGN:  # as for a job in the background
-            signal.signal(number, _stop)
     warnings.showwarning = lambda message, *_, **__: click.echo(f"{name}: warning: {message}", err=True)
-    code, reason = _outcome(command, name)
+    code, reason = _Stopping().outcome(lambda: _outcome(command, name))
     if reason:
         click.echo(f"{name}: {reason}", err=True)
     sys.exit(code)
@@ -51,12 +51,69 @@ def run(command: click.Command, name: str) -> NoReturn:
 class _Stopped(BaseException):
     """A signal asked the process to end."""
 
+    def __init__(self, lost: Callable[[], None]) -> None:
+        super().__init__()
+        self._lost = lost
 
-def _stop(number: int, frame: FrameType | None) -> NoReturn:
-    """Unwind, so that temporary files are removed, and let no second signal disturb that."""
-    for other in SIGNALS:
-        signal.signal(other, signal.SIG_IGN)
-    raise _Stopped(number)
+    def __del__(self) -> None:
+        self._lost()
+
+
+class _Stopping:
+    """Turns a signal into an exception in the main thread, so that temporary files are removed on its way.
+
+    A second signal does not disturb that. But Python drops an exception that is raised while an object is
+    destroyed, and a library may drop one that is raised in its callback. An exception that was dropped is
+    destroyed before it arrived: then the signal comes again a moment later.
+    """
+
+    def __init__(self) -> None:
+        self._number: int | None = None  # the first signal
+        self._is_quiet = False  # an exception is on its way, or all is done
+        self._is_done = False
+        self._report_unraisable = sys.unraisablehook
+
+    def outcome(self, function: Callable[[], tuple[int, str]]) -> tuple[int, str]:
+        """Return what a function returns, or the exit code and the reason of a stop."""
+        try:
+            self._begin()
+            result = function()
+            self._end()
+            return result
+        except BaseException:
+            self._end()
+            if self._number is None:
+                raise
+            return 128 + self._number, f"stopped by {signal.Signals(self._number).name}"
+
+    def _begin(self) -> None:
+        sys.unraisablehook = self._unraisable
+        for number in SIGNALS:
+            if signal.getsignal(number) is not signal.SIG_IGN:  # as for a job in the background
+                signal.signal(number, self._stop)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+
+    def _end(self) -> None:
+        self._is_quiet = self._is_done = True
+        signal.setitimer(signal.ITIMER_REAL, 0)
+
+    def _stop(self, number: int, frame: FrameType | None) -> None:
+        if self._is_quiet:
+            return
+        self._is_quiet = True
+        if self._number is None:
+            self._number = number
+            signal.signal(signal.SIGALRM, self._stop)
+        raise _Stopped(self._lost)
+
+    def _lost(self) -> None:
+        if not self._is_done:
+            self._is_quiet = False
+            signal.setitimer(signal.ITIMER_REAL, MOMENT)
+
+    def _unraisable(self, unraisable: Any) -> None:
+        if not isinstance(unraisable.exc_value, _Stopped):
+            self._report_unraisable(unraisable)
 
 
 def _outcome(command: click.Command, name: str) -> tuple[int, str]:
@@ -65,9 +122,6 @@ def _outcome(command: click.Command, name: str) -> tuple[int, str]:
         code = command.main(prog_name=name, standalone_mode=False)  # that of click.Context.exit, or None
     except click.ClickException as error:
         return REFUSED, " ".join(error.format_message().split())
-    except _Stopped as stopped:
-        number = stopped.args[0]
-        return 128 + number, f"stopped by {signal.Signals(number).name}"
     except Exception as error:
         from deepmuon_runtime.errors import FailedError, RefusedError
 

@@ -31,6 +31,7 @@ def run_isolated(command: click.Command, name: str) -> NoReturn:
     command, name
         As for `deepmuon_cli.ending.run`.
     """
+    signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # until there is somebody to answer them
     child = os.fork()
     if child == 0:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # no memory image for a file that was expected to be damaged
@@ -43,9 +44,10 @@ def run_isolated(command: click.Command, name: str) -> NoReturn:
     for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, pass_on)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     _, status = os.waitpid(child, 0)
     code = os.waitstatus_to_exitcode(status)
-    if -code in SIGNALS:  # it came before the child was ready for it
+    if -code in SIGNALS:  # it came when all was done
         code = 128 - code
     elif code < 0:
         ending = "took no end" if -code == signal.SIGPROF else f"was ended by {signal.Signals(-code).name}"

@@ -305,7 +305,7 @@ def test_a_stopped_command_leaves_nothing(model_file, tmp_path, number, code):
     )
     wait_for_partial_file(folder)
     process.send_signal(number)
-    _, err = process.communicate(timeout=60)
+    _, err = process.communicate(timeout=600)
     assert process.returncode == code
     assert err == f"deepmuon-gen: stopped by {number.name}\n"
     assert list(folder.iterdir()) == []
@@ -313,7 +313,7 @@ def test_a_stopped_command_leaves_nothing(model_file, tmp_path, number, code):
 
 def wait_for_partial_file(folder: Path) -> None:
     """Wait until muons are being written."""
-    end = time.monotonic() + 60
+    end = time.monotonic() + 600
     while not any(path.stat().st_size > 1_000_000 for path in folder.glob("*.deepmuon-partial")):
         assert time.monotonic() < end
         time.sleep(0.01)
