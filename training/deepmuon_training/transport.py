@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from typing import Any
 
@@ -16,7 +16,7 @@ from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
 from deepmuon_training.geant4_processes import PRIMARY, SlabJob, run_geant4
 from deepmuon_training.sample import MINIMUM_ENERGY, Sample
 
-__all__ = ["Transported", "transport"]
+__all__ = ["Transported", "below_slab", "transport"]
 
 _LEAST_LOSS = 0.18
 """A muon with E |w| below so many GeV per metre of water is not carried, because it can't arrive.
@@ -123,23 +123,44 @@ def transport(
     survivors = exits[~upward & ~below_minimum]
     energy, u, v, w = (np.ascontiguousarray(survivors[name]) for name in ("energy", "u", "v", "w"))
     crossed = Muons(energy, u, v, w, muons.pdg_id[carried[survivors["row"]]])
-    started, survived = len(muons), len(crossed)
-    fraction, error = survived / started, _binomial_error(survived, started)
+    started = len(muons)
     return Transported(
-        sample=sample.then(
-            f"carried through {thickness:g} m of {material} by geant4_pybind {version('geant4_pybind')}, "
-            f"seed {seed}: {survived} of {started} survived",
+        sample=replace(
+            below_slab(sample, started, len(crossed), thickness, material, f"seed {seed}"),
             muons=crossed,
-            depth_m=sample.depth_m + thickness,
-            medium=material,
-            rate=None if sample.rate is None else sample.rate * fraction,
-            rate_uncertainty=_rate_uncertainty(sample, fraction, error),
         ),
         started=started,
         screened=started - len(carried),
         stopped=len(carried) - len(exits),
         upward=int(np.sum(upward)),
         below_minimum=int(np.sum(below_minimum)),
+    )
+
+
+def below_slab(sample: Sample, started: int, survived: int, thickness: float, material: str, how: str) -> Sample:
+    """Return a sample, muons aside, at the lower plane of a slab: its depth, medium, rate and provenance.
+
+    Parameters
+    ----------
+    sample : Sample
+        On the upper plane.
+    started, survived : int
+        Muons that were asked for, and those that crossed the lower plane.
+    thickness : float
+        Of the slab in m.
+    material : str
+        Geant4's (NIST) name of what it is made of.
+    how : str
+        How they were carried, for the provenance.
+    """
+    fraction, error = survived / started, _binomial_error(survived, started)
+    return sample.then(
+        f"carried through {thickness:g} m of {material} by geant4_pybind {version('geant4_pybind')}, "
+        f"{how}: {survived} of {started} survived",
+        depth_m=sample.depth_m + thickness,
+        medium=material,
+        rate=None if sample.rate is None else sample.rate * fraction,
+        rate_uncertainty=_rate_uncertainty(sample, fraction, error),
     )
 
 
