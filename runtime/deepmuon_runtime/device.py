@@ -74,6 +74,7 @@ def _load(content: bytes, name: str, provider: str) -> onnxruntime.InferenceSess
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
     options.log_severity_level = 4  # what matters is raised
+    options.add_session_config_entry("session.load_model_format", "ONNX")  # not the other one that it would guess
     settings = [(provider, CUDA_OPTIONS if provider == CUDA_PROVIDER else {})]
     try:
         return onnxruntime.InferenceSession(content, options, providers=settings, enable_fallback=0)

@@ -106,6 +106,7 @@ class Generator:
         """
         from deepmuon_runtime.contract import check_signature, contract_metadata
         from deepmuon_runtime.device import open_session
+        from deepmuon_runtime.onnx_file import check_onnx_file
 
         threads = _usable_processors() if threads is None else threads
         if threads < 1:
@@ -119,6 +120,7 @@ class Generator:
             if depth is not None or architecture is not None:
                 raise RefusedError("a model's file decides its depth and architecture: give the file alone")
             name, content = str(file), _read_model(Path(file))
+        check_onnx_file(content, name)
         session, device = open_session(content, name, device)
         sha256 = hashlib.sha256(content).hexdigest()
         model = Model.from_metadata(contract_metadata(session), name, sha256, len(content))

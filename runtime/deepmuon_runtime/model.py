@@ -13,6 +13,8 @@ __all__ = ["CONTRACT_VERSION", "METADATA_PREFIX", "Model"]
 
 CONTRACT_VERSION = 1
 
+LARGEST_DRAW = 1_000_000  # latents or muons: some dozen megabytes for the smallest run of the network
+
 METADATA_PREFIX = "deepmuon."
 """Begins each key of the contract in a model's `metadata_props`."""
 
@@ -104,7 +106,7 @@ class _Rule(NamedTuple):
 
 
 _TEXT = _Rule(str, bool, "a text")
-_COUNT = _Rule(int, lambda x: x >= 1, "a whole number from 1 on")
+_COUNT = _Rule(int, lambda x: 1 <= x <= LARGEST_DRAW, f"a whole number from 1 to {LARGEST_DRAW}")
 _POSITIVE = _Rule(float, lambda x: 0 < x < math.inf, "a positive number")
 _NOT_NEGATIVE = _Rule(float, lambda x: 0 <= x < math.inf, "a number from 0 on")
 
