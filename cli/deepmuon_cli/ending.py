@@ -41,11 +41,16 @@ def run(command: click.Command, name: str) -> NoReturn:
     name
         What the user typed to start it.
     """
-    warnings.showwarning = lambda message, *_, **__: click.echo(f"{name}: warning: {message}", err=True)
+    warnings.showwarning = lambda message, *_, **__: click.echo(f"{name}: warning: {_printable(message)}", err=True)
     code, reason = _Stopping().outcome(lambda: _outcome(command, name))
     if reason:
-        click.echo(f"{name}: {reason}", err=True)
+        click.echo(f"{name}: {_printable(reason)}", err=True)
     sys.exit(code)
+
+
+def _printable(message: object) -> str:
+    """Return a text whose control characters, which a stranger's file may bring, are escaped."""
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in str(message))
 
 
 class _Stopped(BaseException):

@@ -17,12 +17,20 @@ OUTPUTS = ("kinetic_energy", "direction", "charge")
 _Nodes = dict[str, tuple[str, list[str | int]]]  # name: type, shape
 
 
-def contract_metadata(session: onnxruntime.InferenceSession) -> dict[str, str]:
-    """Return the keys of the contract in a model's metadata, without their prefix."""
+def contract_metadata(session: onnxruntime.InferenceSession, name: str) -> dict[str, str]:
+    """Return the keys of the contract in the metadata of a model of this name, without their prefix.
+
+    Raises
+    ------
+    RefusedError
+        If a key or a value is no text.
+    """
+    try:
+        metadata = session.get_modelmeta().custom_metadata_map
+    except UnicodeDecodeError as error:
+        raise RefusedError(f"{name} breaks the contract: its metadata is no text in UTF-8") from error
     return {
-        key.removeprefix(METADATA_PREFIX): value
-        for key, value in session.get_modelmeta().custom_metadata_map.items()
-        if key.startswith(METADATA_PREFIX)
+        key.removeprefix(METADATA_PREFIX): value for key, value in metadata.items() if key.startswith(METADATA_PREFIX)
     }
 
 
@@ -45,7 +53,10 @@ def _check_nodes(
     nodes: Sequence[onnxruntime.NodeArg],
     expected: _Nodes,
 ) -> None:
-    found = {node.name: (node.type, node.shape) for node in nodes}
+    try:
+        found = {node.name: (node.type, node.shape) for node in nodes}
+    except UnicodeDecodeError as error:
+        raise RefusedError(f"{name} breaks the contract: the name of an {role} is no text in UTF-8") from error
     if found.keys() != expected.keys():
         raise RefusedError(
             f"{name} breaks the contract: its {role}s are {', '.join(found)}, and should be {', '.join(expected)}"

@@ -50,6 +50,7 @@ def open_session(content: bytes, name: str, device: str) -> tuple[onnxruntime.In
     if device not in DEVICES:
         raise RefusedError(f"no device {device!r}: there are {', '.join(DEVICES)}")
     _warn_of_two_runtimes()
+    onnxruntime.set_default_logger_severity(4)  # what matters is raised
     has_cuda = CUDA_PROVIDER in onnxruntime.get_available_providers()
     if device == "cuda" and not has_cuda:
         raise RefusedError(
@@ -73,7 +74,7 @@ def _load(content: bytes, name: str, provider: str) -> onnxruntime.InferenceSess
     # One thread a run: several runs side by side are faster than one run on several threads.
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
-    options.log_severity_level = 4  # what matters is raised
+    options.log_severity_level = 4
     options.add_session_config_entry("session.load_model_format", "ONNX")  # not the other one that it would guess
     settings = [(provider, CUDA_OPTIONS if provider == CUDA_PROVIDER else {})]
     try:
@@ -85,7 +86,6 @@ def _load(content: bytes, name: str, provider: str) -> onnxruntime.InferenceSess
 
 def _load_on_cuda(content: bytes, name: str) -> onnxruntime.InferenceSession | None:
     """Return a session on the GPU, or None: ONNX Runtime falls back to the CPU, or raises."""
-    onnxruntime.set_default_logger_severity(4)
     if hasattr(onnxruntime, "preload_dlls"):  # since 1.21: finds the libraries that pip installed
         with redirect_stdout(io.StringIO()):
             onnxruntime.preload_dlls(directory="")

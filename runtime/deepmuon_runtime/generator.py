@@ -123,7 +123,7 @@ class Generator:
         check_onnx_file(content, name)
         session, device = open_session(content, name, device)
         sha256 = hashlib.sha256(content).hexdigest()
-        model = Model.from_metadata(contract_metadata(session), name, sha256, len(content))
+        model = Model.from_metadata(contract_metadata(session, name), name, sha256, len(content))
         check_signature(session, model)
         generator = cls(session, model, device, threads)
         generator._try()

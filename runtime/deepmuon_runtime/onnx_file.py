@@ -44,9 +44,9 @@ def check_onnx_file(content: bytes, name: str) -> None:
     Raises
     ------
     RefusedError
-        If it is no message of Protocol Buffers; has an IR version above 9 or an opset above 20; has functions, operators
-        of a domain other than the standard one, random ones or loops; keeps numbers in another file; says how it is to
-        be trained; or is nested or repeated without reason.
+        If it is no message of Protocol Buffers; has an IR version above 9 or an opset above 20; has functions,
+        operators of another domain than the standard one, random ones or loops; keeps numbers in another file; has
+        training information; or is nested or repeated without reason.
     """
     try:
         _Walk().look_through("model", memoryview(content), DEEPEST)

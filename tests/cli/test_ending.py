@@ -110,3 +110,8 @@ def test_a_signal_that_is_ignored_from_the_beginning_stays_so():
         [sys.executable, "-c", ignoring, sys.executable, "-c", f"{program}\nrun(command, 'it')"], check=False
     )
     assert done.returncode == os.EX_OK
+
+
+def test_control_characters_of_a_strangers_file_do_not_reach_the_terminal():
+    body = "import warnings\nwarnings.warn('a\\n\\x1b')\nraise click.ClickException('\\x1b[2Jµ\\x9b')"
+    assert run_command(body) == (2, "", "it: warning: a\\n\\x1b\nit: \\x1b[2Jµ\\x9b\n")

@@ -103,6 +103,12 @@ def test_a_model_that_fails_to_run_is_refused(tmp_path):
     assert "failed" in message
 
 
+@pytest.mark.parametrize("text", [b"0.01", b"energy_min_gev", b"latent", b"direction"])
+def test_a_text_that_is_no_utf8_is_refused(tmp_path, text):
+    content = tiny_model()
+    assert "UTF-8" in refusal(tmp_path, content.replace(text, b"\xff" * len(text)))
+
+
 @pytest.mark.parametrize("content", [b"", b"no ONNX", bytes(1000), tiny_model()[:-100]])
 def test_a_file_that_is_no_model_is_refused(tmp_path, content):
     refusal(tmp_path, content)
