@@ -12,24 +12,19 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import click
 import numpy as np
 import torch
 
 from deepmuon_runtime import Generator
+from deepmuon_training.architectures import fit_generator
 from deepmuon_training.card import card, manifest_entry
-from deepmuon_training.charge import fit_charge
 from deepmuon_training.evaluate import evaluate
-from deepmuon_training.export import Exportable, Training, export
+from deepmuon_training.fitted import export_fitted
 from deepmuon_training.plots import draw_pictures
-from deepmuon_training.preprocessing import box_cox
-from deepmuon_training.quantile import QuantileGenerator
-from deepmuon_training.quantile_fit import ENERGY_MAX, fit_quantile
-from deepmuon_training.quantile_tables import table_error, tabulate
 from deepmuon_training.sample import (
     HELD_OUT_CRY_MUONS,
     MINIMUM_ENERGY,
@@ -39,13 +34,13 @@ from deepmuon_training.sample import (
     write_sample,
 )
 from deepmuon_training.smoothing import StepSmoother
-from deepmuon_training.transformer_fit import fit_transformer
-from deepmuon_training.transformer_model import ChargeTable, TransformerModel, radius_table, raw_muons
 from deepmuon_training.transport import transport
+from deepmuon_training.vectors import muon_vectors
 
 REPOSITORY = Path(__file__).parents[1]
 RELEASED = REPOSITORY / "models" / "deepmuon_models"
 EVALUATIONS = REPOSITORY / "docs" / "evaluations"
+VECTORS = REPOSITORY / "tests" / "vectors"
 SEED = 1
 EVALUATED_MUONS = 20_000_000
 DEPTHS = (0, 10, 20, 30, 40, 50)
@@ -57,14 +52,6 @@ DEEP = 30
 
 DEEP_ROWS = {"testing": slice(8_000_000), "training": slice(8_000_000, 24_000_000)}
 """Which muons of the larger run test and train the generators of the deep."""
-
-
-class Made(NamedTuple):
-    """A generator ready for export, and what its card says of it."""
-
-    exportable: Exportable
-    notes: list[str]
-    unphysical_before_mapping: float | None
 
 
 @click.command(help=__doc__)
@@ -137,57 +124,6 @@ def transport_seed(part: str, depth: int) -> int:
     return depth + ("training", "testing").index(part)
 
 
-def make_quantile(sample: Sample, folder: Path) -> Made:
-    """Fit and tabulate."""
-    generator = fit_quantile(sample.muons, seed=SEED, checkpoint=folder / "charge.pt")
-    tables = tabulate(generator)
-    return Made(tables, [*_tail_notes(generator), str(table_error(generator, tables, seed=SEED))], None)
-
-
-def _tail_notes(generator: QuantileGenerator) -> list[str]:
-    tails, clip = generator.tails, generator.condition
-    low, high = (1000 * generator.transform.energy(clip.low), generator.transform.energy(clip.high))
-    return [
-        f"Above {tails.high:.0f} GeV, where the training sample thins out, the flux above E goes as "
-        f"E^-{tails.high_exponent:.2f}, up to {ENERGY_MAX:.0e} GeV; below {1000 * tails.low:.1f} MeV the flux under E "
-        f"goes as E^{tails.low_exponent:.2f}, down to 1 MeV.",
-        f"Muons above {high:.0f} GeV share one distribution of angles and charges; so do those below {low:.1f} MeV.",
-    ]
-
-
-def make_transformer(sample: Sample, folder: Path) -> Made:
-    """Fit, and add what the paper's network lacks: true zenith angles and charges."""
-    network, transform = fit_transformer(sample.muons, seed=SEED, checkpoint=folder / "transformer.pt")
-    charge = fit_charge(sample.muons, transform, seed=SEED, checkpoint=folder / "charge.pt")
-    energy_range = MINIMUM_ENERGY, float(sample.muons.kinetic_energy.max())
-    model = TransformerModel.stored(
-        network,
-        transform=transform,
-        angle=radius_table(network, sample.muons, seed=SEED),
-        charge=ChargeTable.of(charge, transform),
-        energy_range=energy_range,
-    )
-    raw = raw_muons(model.network, EVALUATED_MUONS // 10, seed=SEED + 1)
-    energy, radius = box_cox(raw[:, 0] + transform.mean).numpy(), raw[:, 1:].norm(dim=1).numpy()
-    outside = (energy < energy_range[0]) | (energy > energy_range[1])
-    grazing = np.mean((radius < 1) & (radius > np.sqrt(1 - 0.2**2)))
-    truth = np.mean(sample.muons.cos_zenith < 0.2)
-    notes = [
-        f"The {model.muons_per_draw} muons of a draw are a stratified, correlated set.",
-        f"Of the bare network's muons {np.mean(radius >= 1):.2%} have cos2 x + cos2 y > 1, and {grazing:.3%} have cos "
-        f"zenith < 0.2, where the training sample has {truth:.3%}: the graph's table of zenith angles mends both. "
-        f"{np.mean(outside):.4%} have an energy outside of {energy_range[0]:g} to {energy_range[1]:.0f} GeV, to which "
-        "it is clipped.",
-    ]
-    return Made(model, notes, float(np.mean((radius >= 1) | outside)))
-
-
-ARCHITECTURES: dict[str, Callable[[Sample, Path], Made]] = {
-    "quantile": make_quantile,
-    "transformer": make_transformer,
-}
-
-
 def make_model(work: Path, architecture: str, depth: int) -> None:
     """Fit and export one model, then evaluate it and write its card."""
     name = f"{architecture}-{depth}m"
@@ -199,18 +135,15 @@ def make_model(work: Path, architecture: str, depth: int) -> None:
         notes.write_text(json.dumps(fit_and_export(architecture, sample, folder / f"{name}.onnx")))
     path = RELEASED / f"{name}.onnx"
     shutil.copyfile(folder / path.name, path)
+    (VECTORS / f"{name}.json").write_text(muon_vectors(path), encoding="utf-8")
     evaluate_model(work, path, sample, **json.loads(notes.read_text()))
 
 
 def fit_and_export(architecture: str, sample: Sample, path: Path) -> dict[str, Any]:
-    """Write the ONNX file; return what only the fit knows of it."""
-    made = ARCHITECTURES[architecture](sample, path.parent)
-    mismatch = export(made.exportable, Training(sample, SEED), path)
-    rounding = (
-        f"ONNX Runtime differs from PyTorch in double precision by at most {mismatch.energy:.1e} of the energy and "
-        f"{mismatch.direction:.1e} of a direction, on 100,000 muons."
-    )
-    return {"notes": [*made.notes, rounding], "unphysical_before_mapping": made.unphysical_before_mapping}
+    """Write the ONNX file; return what the fit and the export know of it."""
+    generator = fit_generator(sample, architecture, seed=SEED, checkpoint_folder=path.parent)
+    exported = export_fitted(generator, path, overwrite=True)
+    return {"notes": exported.notes, "unphysical_before_mapping": exported.unphysical_before_mapping}
 
 
 def evaluate_model(

@@ -14,7 +14,6 @@ to disk, and only then linked to its name: under that name there is a complete f
 
 from __future__ import annotations
 
-import errno
 import os
 import secrets
 from collections.abc import Callable, Iterator, Mapping
@@ -31,6 +30,7 @@ import numpy as np
 
 from deepmuon_runtime.errors import FailedError, RefusedError
 from deepmuon_runtime.muons import Muons
+from deepmuon_runtime.publish import publish
 from deepmuon_runtime.quiet_file import QuietFile
 
 __all__ = [
@@ -191,7 +191,7 @@ class MuonWriter:
             if kind is None:
                 with self._failures():
                     self._in_thread(self._finish)
-                    self._publish()
+                    publish(self._partial, self.path, self._overwrite)
         finally:
             self._discard()
 
@@ -244,13 +244,6 @@ class MuonWriter:
         if isinstance(rate, (int, float, np.number)) and rate > 0:
             attributes["live_time_s_m2"] = self.count / float(rate)
         return attributes
-
-    def _publish(self) -> None:
-        if self._overwrite:
-            os.replace(self._partial, self.path)
-        else:
-            _link(self._partial, self.path)
-        _flush_names_to_disk(self.path.parent)
 
     def _raise_fault(self) -> None:
         if self._backing.error is not None:
@@ -388,27 +381,6 @@ def python_value(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.tolist()
     return value.item() if isinstance(value, np.generic) else value
-
-
-def _link(source: Path, target: Path) -> None:
-    """Give the complete file its name, unless the name is taken: then raise FileExistsError."""
-    try:
-        os.link(source, target)
-    except OSError as error:
-        if error.errno not in (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK):
-            raise
-        # A file system without hard links (FAT, some network ones): reserve the name, then move over it.
-        os.close(os.open(target, os.O_CREAT | os.O_EXCL))
-        os.replace(source, target)
-
-
-def _flush_names_to_disk(folder: Path) -> None:
-    """Make the names in a folder survive a loss of power."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def reason(error: BaseException) -> str:

@@ -144,5 +144,5 @@ def exportable(architecture: str, request: pytest.FixtureRequest) -> Exportable:
 def model(exportable: Exportable, sample: Sample, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The file of each, exported."""
     path = tmp_path_factory.mktemp("models") / f"{exportable.architecture}.onnx"
-    export(exportable, Training(sample, seed=1), path)
+    export(exportable, Training.of(sample, seed=1), path)
     return path

@@ -19,7 +19,7 @@ from onnx import TensorProto
 from onnx.reference import ReferenceEvaluator
 
 from deepmuon_runtime import Generator
-from deepmuon_runtime.errors import FailedError
+from deepmuon_runtime.errors import FailedError, RefusedError
 from deepmuon_runtime.latent import latents
 from deepmuon_training.export import Exportable, Training, export
 from deepmuon_training.graph import Graph
@@ -84,7 +84,7 @@ def test_a_model_says_what_the_contract_asks_for(proto, exportable):
 
 def test_a_model_leaves_out_what_is_unknown(exportable, sample, tmp_path):
     unknown = replace(sample, rate=None, rate_uncertainty=None, smoothed=None)
-    export(exportable, Training(unknown, seed=1), tmp_path / "model.onnx")
+    export(exportable, Training.of(unknown, seed=1), tmp_path / "model.onnx")
     keys = {p.key.removeprefix("deepmuon.") for p in onnx.load(tmp_path / "model.onnx").metadata_props}
     assert keys.isdisjoint({"rate_hz_per_m2", "rate_uncertainty_hz_per_m2", "training_smoothed"})
     assert {"depth_m", "training_seed"} <= keys
@@ -137,12 +137,12 @@ def test_the_charge_is_computed_in_float_and_cast_last(proto):
 
 
 def test_the_same_training_gives_the_same_bytes(exportable, sample, model, tmp_path):
-    export(exportable, Training(sample, seed=1), tmp_path / "again.onnx")
+    export(exportable, Training.of(sample, seed=1), tmp_path / "again.onnx")
     assert (tmp_path / "again.onnx").read_bytes() == model.read_bytes()
 
 
 def test_the_difference_from_pytorch_is_rounding(exportable, sample, tmp_path):
-    mismatch = export(exportable, Training(sample, seed=1), tmp_path / "model.onnx")
+    mismatch = export(exportable, Training.of(sample, seed=1), tmp_path / "model.onnx")
     assert mismatch.energy < 5e-5
     assert mismatch.direction < 1e-5
     assert mismatch.charges < 20
@@ -188,12 +188,20 @@ FAULTS = {
 def test_a_graph_that_differs_is_not_written(exportable, sample, tmp_path, fault):
     path = tmp_path / "model.onnx"
     with pytest.raises(FailedError, match="ONNX Runtime and PyTorch differ by"):
-        export(Faulty(exportable, FAULTS[fault]), Training(sample, seed=1), path)
+        export(Faulty(exportable, FAULTS[fault]), Training.of(sample, seed=1), path)
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_file_that_exists_is_replaced_only_if_wanted(exportable, sample, tmp_path):
+    path = tmp_path / "model.onnx"
+    path.write_text("an older model")
+    with pytest.raises(RefusedError, match="exists already"):
+        export(exportable, Training.of(sample, seed=1), path)
+    assert path.read_text() == "an older model"
+
+
 def test_a_graph_without_fault_is_written(exportable, sample, tmp_path):
-    export(Faulty(exportable, lambda g, e, d, c: (e, d, c)), Training(sample, seed=1), tmp_path / "model.onnx")
+    export(Faulty(exportable, lambda g, e, d, c: (e, d, c)), Training.of(sample, seed=1), tmp_path / "model.onnx")
     assert (tmp_path / "model.onnx").exists()
 
 
@@ -201,7 +209,7 @@ def test_a_file_that_exists_outlives_a_failed_export(exportable, sample, tmp_pat
     path = tmp_path / "model.onnx"
     path.write_text("an older model")
     with pytest.raises(FailedError):
-        export(Faulty(exportable, FAULTS["upward"]), Training(sample, seed=1), path)
+        export(Faulty(exportable, FAULTS["upward"]), Training.of(sample, seed=1), path, overwrite=True)
     assert path.read_text() == "an older model"
 
 
@@ -250,14 +258,14 @@ def test_the_runtime_opens_a_model_and_knows_its_rate(model, sample):
 def test_muons_at_the_ends_of_the_energy_range_are_within_it(transformer_model, sample, tmp_path, energy_max):
     """Both ends are written with all their digits: the runtime refuses muons outside of them."""
     clipped = replace(transformer_model, energy_range=(0.1000001, energy_max))
-    export(clipped, Training(sample, seed=1), tmp_path / "model.onnx")
+    export(clipped, Training.of(sample, seed=1), tmp_path / "model.onnx")
     muons = Generator.open(file=tmp_path / "model.onnx", device="cpu", threads=1).sample(10_000, seed=1)
     assert muons.kinetic_energy.min() == np.float32(0.1000001)
     assert muons.kinetic_energy.max() == np.float32(energy_max)
 
 
 def test_transformers_are_stored_in_float16(transformer_model, sample, tmp_path):
-    export(transformer_model, Training(sample, seed=1), tmp_path / "model.onnx")
+    export(transformer_model, Training.of(sample, seed=1), tmp_path / "model.onnx")
     initializers = onnx.load(tmp_path / "model.onnx").graph.initializer
     stored = sum(np.prod(tensor.dims) for tensor in initializers if tensor.data_type == TensorProto.FLOAT16)
     assert stored == sum(parameter.numel() for parameter in transformer_model.network.parameters())
@@ -273,5 +281,5 @@ def test_models_of_the_released_sizes_are_at_most_1_mb(quantile_tables, transfor
         energy_range=transformer_model.energy_range,
     )
     for generator in (quantile_tables, wide):
-        export(generator, Training(sample, seed=1), tmp_path / "model.onnx")
+        export(generator, Training.of(sample, seed=1), tmp_path / "model.onnx", overwrite=True)
         assert (tmp_path / "model.onnx").stat().st_size <= 1_000_000

@@ -27,7 +27,7 @@ TINY = QuantileSchedules(
 @pytest.fixture(scope="module")
 def generated(quantile_tables, sample, tmp_path_factory):
     path = tmp_path_factory.mktemp("quantile") / "model.onnx"
-    export(quantile_tables, Training(sample, seed=1), path)
+    export(quantile_tables, Training.of(sample, seed=1), path)
     return Generator.open(file=path, device="cpu", threads=1).sample(N, seed=1)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import inf, sqrt
 
@@ -11,11 +12,11 @@ from numpy.typing import NDArray
 from deepmuon_runtime.muons import Muons
 from deepmuon_training.chi_square import ChiSquare
 
-__all__ = ["AzimuthScore", "Harmonic", "compare_azimuth"]
+__all__ = ["AzimuthScore", "Harmonic", "compare_azimuth", "harmonic_moments", "in_ranges"]
 
 _HARMONICS = 4
 _RANGES = {"below 1 GeV": (0.0, 1.0), "1 to 10 GeV": (1.0, 10.0), "above 10 GeV": (10.0, inf)}
-_FEWEST = 1000  # muons of either sample under which an energy range is left out
+_FEWEST = 1000  # muons of a sample under which an energy range is left out
 _CHUNK = 1 << 20
 
 Float = NDArray[np.float64]
@@ -47,13 +48,24 @@ class AzimuthScore:
     chi_square: ChiSquare
 
 
-def _moments(muons: Muons) -> tuple[int, Float, Float]:
-    """Find number, mean [8] and covariance [8, 8] of cos(k azimuth), sin(k azimuth), k = 1 to 4."""
+def in_ranges(muons: Muons) -> Iterator[tuple[str, Muons]]:
+    """Yield the muons below 1 GeV, from 1 to 10 GeV, and above, with the range's name, where there are 1000.
+
+    Vertical ones, which have no azimuth, are left out.
+    """
+    inclined = (muons.u != 0) | (muons.v != 0)
+    for name, (low, high) in _RANGES.items():
+        part = muons[inclined & (muons.kinetic_energy >= low) & (muons.kinetic_energy < high)]
+        if len(part) >= _FEWEST:
+            yield name, part
+
+
+def harmonic_moments(muons: Muons) -> tuple[int, Float, Float]:
+    """Find number, mean [8] and covariance [8, 8] of cos(k azimuth), sin(k azimuth), k = 1 to 4, of inclined muons."""
     number, first, second = 0, np.zeros(2 * _HARMONICS), np.zeros((2 * _HARMONICS,) * 2)
     for start in range(0, len(muons), _CHUNK):
         part = muons[start : start + _CHUNK]
         direction = part.u + 1j * part.v.astype(np.float64)
-        direction = direction[direction != 0]  # the vertical has no azimuth
         phase = direction / np.abs(direction)
         powers = np.stack([phase**k for k in range(1, _HARMONICS + 1)])
         waves = np.concatenate([powers.real, powers.imag])
@@ -64,12 +76,10 @@ def _moments(muons: Muons) -> tuple[int, Float, Float]:
     return number, mean, second / max(number, 1) - np.outer(mean, mean)
 
 
-def _compare_range(generated: Muons, held_out: Muons) -> tuple[tuple[Harmonic, ...], ChiSquare] | None:
-    """Harmonics of one energy range and Hotelling's T^2 of their differences; None for too few muons."""
-    n, mean_p, covariance_p = _moments(generated)
-    m, mean_q, covariance_q = _moments(held_out)
-    if min(n, m) < _FEWEST:
-        return None
+def _compare_range(generated: Muons, held_out: Muons) -> tuple[tuple[Harmonic, ...], ChiSquare]:
+    """Harmonics of one energy range and Hotelling's T^2 of their differences."""
+    n, mean_p, covariance_p = harmonic_moments(generated)
+    m, mean_q, covariance_q = harmonic_moments(held_out)
     difference = mean_p - mean_q
     noise = (n * covariance_p + m * covariance_q) / (n + m) * (1 / n + 1 / m)
 
@@ -96,10 +106,9 @@ def compare_azimuth(generated: Muons, held_out: Muons) -> AzimuthScore:
     A range with fewer than 1000 muons in either sample is left out.
     """
     harmonics, chi2, ndf = {}, 0.0, 0
-    for name, (low, high) in _RANGES.items():
-        inside = (m[(m.kinetic_energy >= low) & (m.kinetic_energy < high)] for m in (generated, held_out))
-        compared = _compare_range(*inside)
-        if compared is not None:
-            harmonics[name], chi_square = compared
+    ranges = dict(in_ranges(held_out))
+    for name, part in in_ranges(generated):
+        if name in ranges:
+            harmonics[name], chi_square = _compare_range(part, ranges[name])
             chi2, ndf = chi2 + chi_square.chi2, ndf + chi_square.ndf
     return AzimuthScore(harmonics, ChiSquare.of(chi2, ndf))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from importlib.metadata import version
 from pathlib import Path
 from typing import Protocol
@@ -17,9 +17,11 @@ from onnx import TensorProto
 from deepmuon_runtime.errors import FailedError
 from deepmuon_runtime.latent import latents
 from deepmuon_runtime.model import CONTRACT_VERSION, METADATA_PREFIX
+from deepmuon_runtime.muon_file import check_output
 from deepmuon_training.graph import Graph
 from deepmuon_training.preprocessing import LAMBDA
 from deepmuon_training.sample import Sample
+from deepmuon_training.whole_file import write_whole
 
 __all__ = ["Exportable", "Mismatch", "Training", "compare", "export"]
 
@@ -38,11 +40,25 @@ class Exportable(Protocol):
     [muons, 3] and charge [muons], in the latents' precision. ``graph`` builds the same in ONNX.
     """
 
-    architecture: str
-    latent_size: int
-    muons_per_draw: int
-    energy_range: tuple[float, float]
-    energy_mean: float
+    @property
+    def architecture(self) -> str:
+        """Its name."""
+
+    @property
+    def latent_size(self) -> int:
+        """Uniform numbers of a draw."""
+
+    @property
+    def muons_per_draw(self) -> int:
+        """Muons made of them."""
+
+    @property
+    def energy_range(self) -> tuple[float, float]:
+        """Lowest and highest kinetic energy [GeV]."""
+
+    @property
+    def energy_mean(self) -> float:
+        """Mean of the transformed energy in training; for the record."""
 
     def __call__(self, latent: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Evaluate in PyTorch."""
@@ -53,10 +69,33 @@ class Exportable(Protocol):
 
 @dataclass(frozen=True)
 class Training:
-    """What a model was trained on."""
+    """What a model was trained on.
 
-    sample: Sample
+    Parameters
+    ----------
+    depth_m, medium, source, provenance, rate, rate_uncertainty, smoothed
+        Of the sample, see `deepmuon_training.sample.Sample`.
+    muons
+        How many.
+    seed
+        Of weights and batches.
+    """
+
+    depth_m: float
+    medium: str
+    source: str
+    provenance: tuple[str, ...]
+    rate: float | None
+    rate_uncertainty: float | None
+    smoothed: bool | None
+    muons: int
     seed: int
+
+    @classmethod
+    def of(cls, sample: Sample, seed: int) -> Training:
+        """Note what a sample is, without its muons."""
+        alike = {f.name: getattr(sample, f.name) for f in fields(cls) if f.name not in ("muons", "seed")}
+        return cls(**alike, muons=len(sample), seed=seed)
 
 
 @dataclass(frozen=True)
@@ -68,8 +107,19 @@ class Mismatch:
     charges: int
 
 
-def export(generator: Exportable, training: Training, path: Path) -> Mismatch:
+def export(generator: Exportable, training: Training, path: Path, *, overwrite: bool = False) -> Mismatch:
     """Write an ONNX file, after comparing its output with PyTorch's on 100,000 muons.
+
+    Parameters
+    ----------
+    generator
+        The numbers that it stores.
+    training
+        Written as its metadata; what is unknown is left out.
+    path
+        The file.
+    overwrite
+        Whether an existing file is replaced.
 
     Returns
     -------
@@ -78,12 +128,15 @@ def export(generator: Exportable, training: Training, path: Path) -> Mismatch:
 
     Raises
     ------
+    RefusedError
+        If the file exists (without `overwrite`) or can't be written.
     FailedError
         If they differ by more than float32 rounding explains; nothing is written.
     """
+    check_output(path, overwrite)
     contents = _model(generator, training).SerializeToString(deterministic=True)
     mismatch = compare(generator, contents)
-    path.write_bytes(contents)
+    write_whole(path, contents, overwrite=overwrite)
     return mismatch
 
 
@@ -147,25 +200,24 @@ def _model(generator: Exportable, training: Training) -> onnx.ModelProto:
 
 def _metadata(generator: Exportable, training: Training) -> dict[str, str]:
     """Return the model's metadata; what is unknown is left out."""
-    sample = training.sample
     known = {
         "contract_version": CONTRACT_VERSION,
         "architecture": generator.architecture,
-        "depth_m": f"{sample.depth_m:g}",
-        "medium": sample.medium,
+        "depth_m": f"{training.depth_m:g}",
+        "medium": training.medium,
         "muons_per_draw": generator.muons_per_draw,
         "latent_size": generator.latent_size,
         "energy_min_gev": generator.energy_range[0],  # all digits: a muon that the graph clips is within
         "energy_max_gev": generator.energy_range[1],
         "created_by": f"deepmuon-training {version('deepmuon-training')}",
         "licence": LICENCE,
-        "rate_hz_per_m2": None if sample.rate is None else f"{sample.rate:.6g}",
-        "rate_uncertainty_hz_per_m2": None if sample.rate_uncertainty is None else f"{sample.rate_uncertainty:.3g}",
+        "rate_hz_per_m2": None if training.rate is None else f"{training.rate:.6g}",
+        "rate_uncertainty_hz_per_m2": None if training.rate_uncertainty is None else f"{training.rate_uncertainty:.3g}",
         "boxcox_lambda": LAMBDA,
         "energy_mean": f"{generator.energy_mean:.9g}",
-        "training_source": sample.source,
-        "training_smoothed": None if sample.smoothed is None else str(sample.smoothed).lower(),
-        "training_muons": len(sample),
+        "training_source": training.source,
+        "training_smoothed": None if training.smoothed is None else str(training.smoothed).lower(),
+        "training_muons": training.muons,
         "training_seed": training.seed,
     }
     return {key: str(value) for key, value in known.items() if value is not None}

@@ -37,6 +37,8 @@ class QuantileGenerator(nn.Module):
         The probability of mu+.
     """
 
+    architecture = "quantile"
+
     def __init__(self, transform: EnergyTransform, tails: PowerLawTails, charge: ChargeProbability) -> None:
         super().__init__()
         self.transform, self.tails, self.charge = transform, tails, charge

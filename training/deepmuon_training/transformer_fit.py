@@ -9,11 +9,13 @@ import numpy as np
 import torch
 from torch import nn
 
+from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import Muons
+from deepmuon_training.charge import CHARGE_SCHEDULE
 from deepmuon_training.fit import Schedule, fit
 from deepmuon_training.preprocessing import EnergyTransform
 from deepmuon_training.sliced_wasserstein import deepmuon_loss, random_directions, sliced_wasserstein
-from deepmuon_training.transformer import LATENTS, Transformer
+from deepmuon_training.transformer import HEADS, LATENTS, Transformer
 from deepmuon_training.validation import VALIDATION_FRACTION
 
 __all__ = ["TransformerSettings", "features", "fit_transformer"]
@@ -36,6 +38,15 @@ class TransformerSettings:
         Random projections a step; 2048 in the paper.
     schedule
         Steps and rates.
+    charge
+        Of the charge's probability, which is a network of its own.
+    calibration
+        Muons of the trained network that its table of zenith angles is made of.
+
+    Raises
+    ------
+    RefusedError
+        If d is not a multiple of 8, the network's heads, or the batch has not d muons.
     """
 
     d: int = 128
@@ -44,6 +55,15 @@ class TransformerSettings:
     schedule: Schedule = Schedule(
         steps=6000, learning_rate=1e-3, weight_decay=0.01, averaging=0.998, validate_every=250, patience=16
     )
+    charge: Schedule = CHARGE_SCHEDULE
+    calibration: int = 4_000_000
+
+    def __post_init__(self) -> None:
+        """Refuse a network that can't be."""
+        if self.d < 1 or self.d % HEADS:
+            raise RefusedError(f"d is {self.d}, and should be a multiple of {HEADS}: the network has so many heads")
+        if self.batch < self.d:
+            raise RefusedError(f"a batch of {self.batch} muons is less than one draw of {self.d}")
 
 
 def features(muons: Muons, transform: EnergyTransform) -> torch.Tensor:
