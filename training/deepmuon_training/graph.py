@@ -24,12 +24,19 @@ class Graph:
 
     Calling the graph adds a node: ``y = graph("Mul", x, 2.0)``. Numbers and arrays become constants, numbers as
     float32. Names are counted, so that the same calls give the same bytes.
+
+    Attributes
+    ----------
+    nodes : list of onnx.NodeProto
+        What was added, in order.
+    initializers : list of onnx.TensorProto
+        The constants, in order of their first use.
     """
 
     def __init__(self) -> None:
-        self._nodes: list[onnx.NodeProto] = []
+        self.nodes: list[onnx.NodeProto] = []
+        self.initializers: list[onnx.TensorProto] = []
         self._constants: dict[tuple[str, tuple[int, ...], bytes], str] = {}
-        self._initializers: list[onnx.TensorProto] = []
 
     def __call__(self, operator: str, *inputs: str | float | NDArray[Any], **attributes: Any) -> str:
         """Add a node of one output and return the output's name."""
@@ -37,9 +44,9 @@ class Graph:
 
     def several(self, operator: str, outputs: int, *inputs: str | float | NDArray[Any], **attributes: Any) -> list[str]:
         """Add a node of several outputs and return their names."""
-        names = [f"{operator}_{len(self._nodes)}" + (f"_{k}" if outputs > 1 else "") for k in range(outputs)]
+        names = [f"{operator}_{len(self.nodes)}" + (f"_{k}" if outputs > 1 else "") for k in range(outputs)]
         sources = [value if isinstance(value, str) else self.constant(value) for value in inputs]
-        self._nodes.append(helper.make_node(operator, sources, names, **attributes))
+        self.nodes.append(helper.make_node(operator, sources, names, **attributes))
         return names
 
     def constant(self, value: float | NDArray[Any]) -> str:
@@ -48,7 +55,7 @@ class Graph:
         key = array.dtype.str, array.shape, array.tobytes()
         if key not in self._constants:
             self._constants[key] = f"constant_{len(self._constants)}"
-            self._initializers.append(numpy_helper.from_array(array, self._constants[key]))
+            self.initializers.append(numpy_helper.from_array(array, self._constants[key]))
         return self._constants[key]
 
     def model(
@@ -74,13 +81,13 @@ class Graph:
             If it is no valid model, or its types and shapes do not fit together.
         """
         for name, (value, _, _) in outputs.items():
-            self._nodes.append(helper.make_node("Identity", [value], [name]))
+            self.nodes.append(helper.make_node("Identity", [value], [name]))
         graph = helper.make_graph(
-            self._nodes,
+            self.nodes,
             "deepmuon",
             [helper.make_tensor_value_info(name, TensorProto.FLOAT, shape) for name, shape in inputs.items()],
             [helper.make_tensor_value_info(name, kind, shape) for name, (_, kind, shape) in outputs.items()],
-            self._initializers,
+            self.initializers,
         )
         model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
         model.producer_name = "deepmuon"
