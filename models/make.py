@@ -36,12 +36,10 @@ from deepmuon_training.sample import (
 from deepmuon_training.smoothing import StepSmoother
 from deepmuon_training.transport import transport
 from deepmuon_training.vectors import muon_vectors
-from deepmuon_training.vectors import muon_vectors
 
 REPOSITORY = Path(__file__).parents[1]
 RELEASED = REPOSITORY / "models" / "deepmuon_models"
 EVALUATIONS = REPOSITORY / "docs" / "evaluations"
-VECTORS = REPOSITORY / "tests" / "vectors"
 VECTORS = REPOSITORY / "tests" / "vectors"
 SEED = 1
 EVALUATED_MUONS = 20_000_000
@@ -137,7 +135,6 @@ def make_model(work: Path, architecture: str, depth: int) -> None:
         notes.write_text(json.dumps(fit_and_export(architecture, sample, folder / f"{name}.onnx")))
     path = RELEASED / f"{name}.onnx"
     shutil.copyfile(folder / path.name, path)
-    (VECTORS / f"{name}.json").write_text(muon_vectors(path), encoding="utf-8")
     (VECTORS / f"{name}.json").write_text(muon_vectors(path), encoding="utf-8")
     evaluate_model(work, path, sample, **json.loads(notes.read_text()))
 
