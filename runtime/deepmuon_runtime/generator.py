@@ -8,6 +8,7 @@ import os
 import shlex
 import shutil
 import sys
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from itertools import chain, pairwise
@@ -31,14 +32,19 @@ from deepmuon_runtime.shard import WHOLE_RUN, Shard
 if TYPE_CHECKING:
     import onnxruntime
 
+    from deepmuon_runtime.bound_run import BoundRun
+
 __all__ = ["LARGEST_NUMBER", "Generator"]
 
 LARGEST_NUMBER = 2**53
 """The most muons of one run."""
 
-BLOCK = 1 << 14  # muons of one run of the network, about: what it works on stays in the cache
-CHUNK_BLOCKS = 8  # blocks of one task of a thread, and of one write
+# Muons of one run of the network, about: what it works on stays in a CPU's cache; a GPU wants much at once.
+BLOCK = {"cpu": 1 << 14, "cuda": 1 << 18}
+CHUNK_BLOCKS = {"cpu": 8, "cuda": 1}  # blocks of one task of a thread, and of one write
 LARGEST_MODEL = 2**31 - 1  # bytes: the limit of protobuf, and so of an ONNX file without external data
+
+Outputs = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int8]]  # energy, direction, charge
 
 
 class Generator:
@@ -72,7 +78,8 @@ class Generator:
         self.threads = threads
         self._session = session
         # Multiples of 8 draws: a block begins with a whole step of the random number generator.
-        self._block_draws = max(1, -(-BLOCK // (8 * model.muons_per_draw))) * 8
+        self._block_draws = max(1, -(-BLOCK[device] // (8 * model.muons_per_draw))) * 8
+        self._own = threading.local()  # each thread's memory for its runs
 
     @classmethod
     def open(
@@ -286,7 +293,7 @@ class Generator:
 
     def _parts(self, numbers: range) -> Iterator[range]:
         """Cut the numbers of muons at multiples of many blocks; the first part makes a file's chunks: no small one."""
-        size = CHUNK_BLOCKS * self._block_draws * self.model.muons_per_draw
+        size = CHUNK_BLOCKS[self.device] * self._block_draws * self.model.muons_per_draw
         first_end = -(-numbers.start // size) * size + size
         edges = chain([numbers.start], range(first_end, numbers.stop, size), [numbers.stop])
         return (range(start, stop) for start, stop in pairwise(edges) if numbers)
@@ -294,31 +301,33 @@ class Generator:
     def _fill(self, muons: Muons, seed: int, first: int) -> None:
         """Make the muons from number `first` on, block by block."""
         size = self._block_draws * self.model.muons_per_draw
-        latent = np.empty((self._block_draws, self.model.latent_size), np.float32)
+        run = self._thread_run()
         done = 0
         while done < len(muons):
             block, skipped = divmod(first + done, size)
             part = muons[done : done + size - skipped]
-            fill_latents(latent, seed, block * self._block_draws)
-            self._run(latent, skipped, part)
+            fill_latents(run.latent, seed, block * self._block_draws)
+            self._run(run, skipped, part)
             check_physical(part, self.model.energy_min_gev, self.model.energy_max_gev, first + done)
             done += len(part)
 
-    def _run(self, latent: NDArray[np.float32], skipped: int, muons: Muons) -> None:
-        """Turn latents into muons, leave out the first ones, and keep as many as asked for."""
-        from deepmuon_runtime.contract import INPUT, OUTPUTS
+    def _thread_run(self) -> BoundRun:
+        """Return the run of blocks that belongs to this thread."""
+        from deepmuon_runtime.bound_run import BoundRun
 
+        if not hasattr(self._own, "run"):
+            muons = self._block_draws * self.model.muons_per_draw
+            self._own.run = BoundRun(self._session, self.device, self._block_draws, self.model.latent_size, muons)
+        run: BoundRun = self._own.run
+        return run
+
+    def _run(self, run: Callable[[], Outputs], skipped: int, muons: Muons) -> None:
+        """Run the model, leave out the first muons, and keep as many as asked for."""
         try:
-            energy, direction, charge = self._session.run(OUTPUTS, {INPUT: latent})
+            energy, direction, charge = run()
         except Exception as error:  # ONNX Runtime's own classes have no common base
             reason = str(error).strip().splitlines()[0]
             raise FailedError(f"the model {self.model.name} failed: {reason}") from error
-        expected = len(latent) * self.model.muons_per_draw
-        if not len(energy) == len(direction) == len(charge) == expected:
-            raise FailedError(
-                f"the model {self.model.name} gave {len(energy)} energies, {len(direction)} directions and "
-                f"{len(charge)} charges, and should give {expected} each"
-            )
         kept = slice(skipped, skipped + len(muons))
         muons.kinetic_energy[:] = energy[kept]
         for axis, column in enumerate((muons.u, muons.v, muons.w)):
@@ -329,8 +338,20 @@ class Generator:
         """Refuse a model that fails at the ends or in the middle of its latents."""
         latent = np.repeat(np.linspace(-1, 1, 5, dtype=np.float32)[:, None], self.model.latent_size, axis=1)
         muons = Muons.empty(len(latent) * self.model.muons_per_draw)
+
+        def run() -> Outputs:
+            from deepmuon_runtime.contract import INPUT, OUTPUTS
+
+            energy, direction, charge = self._session.run(OUTPUTS, {INPUT: latent})
+            if not len(energy) == len(direction) == len(charge) == len(muons):
+                raise ValueError(
+                    f"it gave {len(energy)} energies, {len(direction)} directions and {len(charge)} charges, "
+                    f"and should give {len(muons)} each"
+                )
+            return energy, direction, charge
+
         try:
-            self._run(latent, 0, muons)
+            self._run(run, 0, muons)
             check_physical(muons, self.model.energy_min_gev, self.model.energy_max_gev)
         except FailedError as error:
             raise RefusedError(f"{self.model.name} breaks the contract in a trial: {error}") from error

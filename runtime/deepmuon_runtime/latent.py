@@ -35,7 +35,11 @@ COUNT_STREAM = 1
 
 LARGEST_SEED = 2**64 - 1
 
-PIECE = 1 << 13  # words made at once: memory of this size is reused, a larger one is asked of the system anew
+PIECE = 5 << 13  # words made at once, 320 kB: they stay in the cache
+
+# Of both halves of a word at once: the upper 24 bits s of each, and 1/2 after them.
+UPPER_24_BITS = np.uint64(0xFFFFFF00_FFFFFF00)
+ONE_HALF = np.uint64(0x00000080_00000080)
 
 
 def new_seed() -> int:
@@ -114,12 +118,12 @@ def fill_latents(latent: NDArray[np.float32], seed: int, first: int) -> None:
     done = 0
     while done < len(flat):
         raw = philox.random_raw(min(PIECE, (skipped + len(flat) - done + 1) // 2))
+        raw &= UPPER_24_BITS
+        raw |= ONE_HALF
         halves = raw.astype("<u8", copy=False).view("<i4")[skipped : skipped + len(flat) - done]
-        halves >>= 8
         part = flat[done : done + len(halves)]
         part[:] = halves
-        part += np.float32(0.5)
-        part *= np.float32(2.0**-23)
+        part *= np.float32(2.0**-31)
         done += len(part)
         skipped = 0
 
