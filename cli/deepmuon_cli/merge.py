@@ -19,20 +19,29 @@ FILE = click.Path(path_type=Path)
 @click.argument("shards", type=FILE, nargs=-1, required=True)
 @click.option("-o", "--output", type=FILE, metavar="FILE", required=True, help="The HDF5 file to be written.")
 @click.option("--overwrite", is_flag=True, help="Replace an existing file, once the new one is complete.")
+@click.option("--virtual", is_flag=True, help="Let the shards keep the muons: the file only refers to them.")
 @click.option("-q", "--quiet", is_flag=True, help="No closing line.")
 @click.version_option(package_name="deepmuon-runtime", prog_name=NAME, message="%(prog)s %(version)s")
-def merge(shards: tuple[Path, ...], output: Path, overwrite: bool, quiet: bool) -> None:
+def merge(shards: tuple[Path, ...], output: Path, overwrite: bool, virtual: bool, quiet: bool) -> None:
     """Join the shards of a run to the file that one machine would have written.
 
     \b
         deepmuon-merge part-1.h5 part-2.h5 part-3.h5 -o muons.h5
 
-    The files come from `deepmuon-gen --shard`, in any order. Shards of different runs, missing ones, and muons that are
-    in two of them are refused.
+    The files come from `deepmuon-gen --shard`, in any order. Shards of different runs, missing ones, damaged ones, and
+    muons that are in two of them are refused.
+
+    With --virtual nothing is copied: HDF5 finds the muons in the shards, by their paths relative to the folder of
+    the new file, so that they are moved together or not at all.
+
+    \b
+        deepmuon-merge --virtual part-1.h5 part-2.h5 part-3.h5 -o muons.h5
+
+    Where a shard is missing HDF5 reads NaN, without an error; deepmuon-check names it.
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime.merge import merge_shards
 
-    number = merge_shards(shards, output, overwrite=overwrite)
+    number = merge_shards(shards, output, overwrite=overwrite, virtual=virtual)
     if not quiet:
         click.echo(f"{output}: {number:,} muons of {len(shards)} shard{'s' * (len(shards) > 1)}")
 

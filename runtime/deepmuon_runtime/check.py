@@ -6,17 +6,21 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import h5py
 import numpy as np
 
 from deepmuon_runtime.attributes import attribute_defects, is_generated, sound_attributes
+from deepmuon_runtime.checksum import unlike
+from deepmuon_runtime.damaged import READ_ERRORS, member, reason
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.model import Model
-from deepmuon_runtime.muon_file import COLUMNS, READ_ERRORS, check_format, python_value, reason
+from deepmuon_runtime.muon_file import CHECKSUM, COLUMNS, check_format, python_value
 from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
 from deepmuon_runtime.physical import POSITIVE_ENERGIES, describe, find_unphysical
 from deepmuon_runtime.released import list_models
+from deepmuon_runtime.virtual import VirtualColumn, opened_source
 
 __all__ = ["Report", "check_file"]
 
@@ -102,7 +106,7 @@ def check_file(path: str | Path, progress: Callable[[int], object] | None = None
 
 def _report(file: h5py.File, progress: Callable[[int], object] | None) -> Report:
     report = Report()
-    group = _member(file, "muons")
+    group = member(file, "muons")
     if not isinstance(group, h5py.Group):
         report.defects.append("there is no group /muons")
         return report
@@ -119,14 +123,6 @@ def _report(file: h5py.File, progress: Callable[[int], object] | None) -> Report
     return report
 
 
-def _member(group: h5py.Group, name: str) -> h5py.Group | h5py.Dataset | None:
-    """Return what a group holds under a name in the same file: a link to another one is not followed."""
-    try:
-        return None if isinstance(group.get(name, getlink=True), h5py.ExternalLink) else group.get(name)
-    except READ_ERRORS:
-        return None
-
-
 def _read_attributes(node: h5py.HLObject, name: str, defects: list[str]) -> dict[str, Any]:
     try:
         return {key: python_value(value) for key, value in node.attrs.items()}
@@ -139,11 +135,11 @@ def _released_model(sha256: object) -> Model | None:
     return next((model for model in list_models() if model.sha256 == sha256), None)
 
 
-def _sound_columns(group: h5py.Group, count: int | None, defects: list[str]) -> dict[str, h5py.Dataset]:
+def _sound_columns(group: h5py.Group, count: int | None, defects: list[str]) -> dict[str, _Column]:
     """Return the columns that can be read as the format's, and note the defects of all."""
     sound = {}
-    for name in COLUMNS:
-        column = _member(group, name)
+    for name, (_, units) in COLUMNS.items():
+        column = member(group, name)
         if not isinstance(column, h5py.Dataset):
             defects.append(f"the column {name} is missing")
             continue
@@ -151,12 +147,16 @@ def _sound_columns(group: h5py.Group, count: int | None, defects: list[str]) -> 
             found = list(_column_defects(column, name))
         except READ_ERRORS as error:
             found = [f"can't be read: {reason(error)}"]
+        attributes = _read_attributes(column, name, defects)
+        checksum = attributes.get(CHECKSUM)
         if not found:
-            sound[name] = column
+            sound[name] = _Column(VirtualColumn(column) if column.is_virtual else column, checksum)
         if not found and count is not None and len(column) != count:
             found = [f"has {len(column)} muons, and the attribute count is {count}"]
-        if (units := _read_attributes(column, name, defects).get("units")) != COLUMNS[name][1]:
-            found.append(f"has the units {units!r}, and should have {COLUMNS[name][1]!r}")
+        if attributes.get("units") != units:
+            found.append(f"has the units {attributes.get('units')!r}, and should have {units!r}")
+        if not isinstance(checksum, int):
+            found.append(f"has the checksum {checksum!r}, and should have a number, its CRC-32")
         defects += (f"the column {name} {defect}" for defect in found)
     return sound
 
@@ -166,8 +166,10 @@ def _column_defects(column: h5py.Dataset, name: str) -> Iterator[str]:
     dtype = COLUMNS[name][0]
     if column.dtype != dtype or column.ndim != 1:
         yield f"is {column.dtype} of shape {column.shape}, and should be {dtype} of one dimension"
-    elif column.is_virtual or column.external:
-        yield "keeps its numbers in other files"
+    elif column.is_virtual:
+        yield from _source_defects(VirtualColumn(column), name)
+    elif column.external:
+        yield "keeps its numbers in a file that is not HDF5"
     elif column.chunks is None:
         if column.id.get_storage_size() != column.nbytes:
             yield f"holds {column.id.get_storage_size()} of its {column.nbytes} bytes"
@@ -175,7 +177,38 @@ def _column_defects(column: h5py.Dataset, name: str) -> Iterator[str]:
         yield f"holds {column.id.get_num_chunks()} of its {-(-len(column) // column.chunks[0])} chunks"
 
 
-def _examine_muons(columns: dict[str, h5py.Dataset], report: Report, progress: Callable[[int], object] | None) -> None:
+def _source_defects(column: VirtualColumn, name: str) -> Iterator[str]:
+    """Yield the first of the sources that can't be read, and how many others can't."""
+    defects = []
+    for source in column.sources:
+        try:
+            with opened_source(source) as stored:
+                defects += [f"its source {source.path} {defect}" for defect in _column_defects(stored, name)]
+        except OSError as error:
+            defects.append(reason(error))
+    if defects:
+        yield f"can't be read: {defects[0]}" + (f", and {len(defects) - 1} others" if len(defects) > 1 else "")
+
+
+@dataclass
+class _Column:
+    """A column that can be read, and its CRC-32 by its attribute and by what was read of it so far."""
+
+    stored: h5py.Dataset | VirtualColumn
+    expected: int | None
+    found: int = 0
+
+    def read(self, span: slice) -> Any:
+        """Return the next muons' values."""
+        values = self.stored[span]
+        self.found = crc32(values.data, self.found)
+        return values
+
+    def __len__(self) -> int:
+        return len(self.stored)
+
+
+def _examine_muons(columns: dict[str, _Column], report: Report, progress: Callable[[int], object] | None) -> None:
     """Read all muons and note, for each fault, the first that has it and how many have."""
     model = report.model
     energies = POSITIVE_ENERGIES if model is None else (model.energy_min_gev, model.energy_max_gev)
@@ -184,7 +217,7 @@ def _examine_muons(columns: dict[str, h5py.Dataset], report: Report, progress: C
     for first in range(0, total, PIECE):
         span = slice(first, min(first + PIECE, total))
         try:
-            muons = Muons(**{name: column[span] for name, column in columns.items()})
+            muons = Muons(**{name: column.read(span) for name, column in columns.items()})
         except READ_ERRORS as error:
             report.defects.append(f"the muons from {first} on can't be read: {reason(error)}")
             break
@@ -195,7 +228,17 @@ def _examine_muons(columns: dict[str, h5py.Dataset], report: Report, progress: C
             known.count += int(np.count_nonzero(bad))
         if progress is not None:
             progress(len(muons))
+    else:
+        report.defects += _checksum_defects(columns)
     report.defects += (f"muon {known.first} {fault} ({known.muon}){known.others}" for fault, known in faults.items())
+
+
+def _checksum_defects(columns: dict[str, _Column]) -> Iterator[str]:
+    """Yield which columns, read to their end, are not what was written."""
+    for name, column in columns.items():
+        if isinstance(column.expected, int) and column.found != column.expected:
+            where = " (or one of its sources)" if isinstance(column.stored, VirtualColumn) else ""
+            yield f"the column {name}{where} {unlike(column.found, column.expected)}"
 
 
 @dataclass

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
+from zlib import crc32
 
 import numpy as np
 
+from deepmuon_runtime.checksum import unlike
 from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.muon_file import MuonWriter, read_attributes, read_muons
+from deepmuon_runtime.muon_file import COLUMNS, MuonWriter, read_attributes, read_checksums, read_muons
 from deepmuon_runtime.shard import WHOLE_RUN
 
 __all__ = ["merge_shards"]
@@ -34,9 +36,10 @@ def merge_shards(
     output: str | Path,
     *,
     overwrite: bool = False,
+    virtual: bool = False,
     progress: Callable[[int], object] | None = None,
 ) -> int:
-    """Copy the shards of a run, in the order of their muons, to one file, which is that of the single run.
+    """Join the shards of a run, in the order of their muons, to one file, which is that of the single run.
 
     Its attributes are too, but for `created`, and `command_line`, which is that of the first shard.
 
@@ -46,6 +49,8 @@ def merge_shards(
         Files of shards, in any order. They may cut the run into parts of different sizes.
     output, overwrite
         As for `MuonWriter`.
+    virtual
+        Whether the shards keep the muons, and the file only refers to them, by paths relative to its folder.
     progress
         Called after each piece with the number of muons copied since the last call.
 
@@ -56,8 +61,8 @@ def merge_shards(
     Raises
     ------
     RefusedError
-        If a file is no shard, they are not of one run, muons are missing or in two of them, or `output` can't be
-        written.
+        If a file is no shard or damaged, they are not of one run, muons are missing or in two of them, or `output`
+        can't be written.
     FailedError
         If writing fails, or another process writes `output` meanwhile.
     """
@@ -71,13 +76,27 @@ def merge_shards(
     described = {name: value for name, value in parts[0].attributes.items() if name != "live_time_s_m2"}
     described |= {"shard": str(WHOLE_RUN), "first": 0, "seed": np.uint64(described["seed"])}
     with MuonWriter(output, described, overwrite) as writer:
-        for part in parts:
-            count = part.end - part.first
-            for first in range(0, count, PIECE):
-                writer.append(read_muons(part.path, first, min(PIECE, count - first)))
-                if progress is not None:
-                    progress(min(PIECE, count - first))
+        if virtual:
+            writer.refer([part.path for part in parts])
+        else:
+            for part in parts:
+                _copy(part, writer, progress)
     return int(total)
+
+
+def _copy(part: _Part, writer: MuonWriter, progress: Callable[[int], object] | None) -> None:
+    """Copy the muons of a shard, unless they are not those that were written to it."""
+    found = dict.fromkeys(COLUMNS, 0)
+    count = part.end - part.first
+    for first in range(0, count, PIECE):
+        muons = read_muons(part.path, first, min(PIECE, count - first))
+        found = {name: crc32(getattr(muons, name).data, so_far) for name, so_far in found.items()}
+        writer.append(muons)
+        if progress is not None:
+            progress(len(muons))
+    for name, expected in read_checksums(part.path).items():
+        if found[name] != expected:
+            raise RefusedError(f"{part.path} is damaged: the column {name} {unlike(found[name], expected)}")
 
 
 def _part(path: Path) -> _Part:

@@ -8,6 +8,8 @@
     /muons/pdg_id           int8     13 = mu-, -13 = mu+
     /muons attributes       count, depth_m, medium, created, created_by, and what else is known
 
+Each column has the attribute crc32, the CRC-32 of its bytes one after the other.
+
 A file is written under a temporary name in its own folder (`NAME.<8 hex digits>.deepmuon-partial`), flushed
 to disk, and only then linked to its name: under that name there is a complete file or none.
 """
@@ -15,26 +17,33 @@ to disk, and only then linked to its name: under that name there is a complete f
 from __future__ import annotations
 
 import os
-import secrets
-from collections.abc import Callable, Iterator, Mapping
+import weakref
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from datetime import datetime, timezone
 from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
+from zlib import crc32
 
 import h5py
 import numpy as np
 
+from deepmuon_runtime.checksum import joined_crc32
+from deepmuon_runtime.damaged import READ_ERRORS, reason
+from deepmuon_runtime.early_flush import EarlyFlush
 from deepmuon_runtime.errors import FailedError, RefusedError
 from deepmuon_runtime.muons import Muons
+from deepmuon_runtime.partial_file import PARTIAL_SUFFIX, hold, new_partial, warn_of_leftovers
 from deepmuon_runtime.publish import publish
 from deepmuon_runtime.quiet_file import QuietFile
+from deepmuon_runtime.virtual import Source, VirtualColumn, create_virtual_column
 
 __all__ = [
     "BYTES_PER_MUON",
+    "CHECKSUM",
     "COLUMNS",
     "FORMAT",
     "FORMAT_VERSION",
@@ -45,6 +54,7 @@ __all__ = [
     "check_output",
     "python_value",
     "read_attributes",
+    "read_checksums",
     "read_muons",
     "reason",
     "write_muons",
@@ -53,11 +63,8 @@ __all__ = [
 FORMAT = "deepmuon-muons"
 FORMAT_VERSION = 1
 
-PARTIAL_SUFFIX = ".deepmuon-partial"
-"""Ends the name of a file that is still being written, or that a killed process left behind."""
-
-READ_ERRORS = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, MemoryError)
-"""What h5py raises when a file is damaged."""
+CHECKSUM = "crc32"
+"""The attribute of a column with the CRC-32 of its bytes."""
 
 COLUMNS: dict[str, tuple[np.dtype[Any], str]] = {
     "kinetic_energy": (np.dtype("<f4"), "GeV"),
@@ -157,11 +164,14 @@ class MuonWriter:
         self.count = 0
         self._attributes = dict(attributes)
         self._overwrite = overwrite
-        self._partial = self.path.with_name(f"{self.path.name}.{secrets.token_hex(4)}{PARTIAL_SUFFIX}")
+        self._partial = new_partial(self.path)
         self._columns: dict[str, h5py.Dataset] = {}
+        self._checksums = dict.fromkeys(COLUMNS, 0)
 
     def __enter__(self) -> MuonWriter:
         """Create the temporary file."""
+        warn_of_leftovers(self.path)
+        self._remove = weakref.finalize(self, _remove, self._partial)  # at the latest when the process ends
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="muon-writer")
         try:
             self._in_thread(self._open)
@@ -183,6 +193,21 @@ class MuonWriter:
         with self._failures():
             self._in_thread(self._append, muons)
 
+    def refer(self, paths: Sequence[str | Path]) -> None:
+        """Take all muons from other muon files, which keep them, instead of `append`.
+
+        The file finds them by their paths relative to its folder.
+
+        Raises
+        ------
+        RefusedError
+            If one of them can't be read, or keeps its muons in other files itself.
+        FailedError
+            As for `append`.
+        """
+        with self._failures():
+            self._in_thread(self._refer, paths)
+
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
@@ -200,6 +225,8 @@ class MuonWriter:
 
     def _open(self) -> None:
         self._backing = QuietFile(str(self._partial))
+        hold(self._backing.fileno())
+        self._flush = EarlyFlush(self._backing.fileno())
         # Whole chunks go straight to the file: a cache would only copy them once more.
         self._file = h5py.File(self._backing, "w", rdcc_nbytes=0)
 
@@ -208,23 +235,50 @@ class MuonWriter:
             self._create_columns(len(muons))
         end = self.count + len(muons)
         for name, column in self._columns.items():
+            values = np.ascontiguousarray(getattr(muons, name), COLUMNS[name][0])
             column.resize((end,))
-            column[self.count : end] = getattr(muons, name)
+            column[self.count : end] = values
+            self._checksums[name] = crc32(values.data, self._checksums[name])
         self.count = end
         self._raise_fault()
+        self._flush.wrote(len(muons) * BYTES_PER_MUON)
 
     def _create_columns(self, first_length: int) -> None:
         chunk = min(max(first_length, SMALLEST_CHUNK), LARGEST_CHUNK)
         group = self._file.create_group("muons")
-        for name, (dtype, units) in COLUMNS.items():
-            column = group.create_dataset(name, shape=(0,), maxshape=(None,), chunks=(chunk,), dtype=dtype)
-            column.attrs["units"] = units
-            self._columns[name] = column
+        for name, (dtype, _) in COLUMNS.items():
+            self._columns[name] = group.create_dataset(name, shape=(0,), maxshape=(None,), chunks=(chunk,), dtype=dtype)
+
+    def _refer(self, paths: Sequence[str | Path]) -> None:
+        parts = [part for part in map(self._part, paths) if part.length]
+        if not parts:
+            return
+        ends = np.cumsum([part.length for part in parts]).tolist()
+        group = self._file.create_group("muons")
+        for name, (dtype, _) in COLUMNS.items():
+            sources = [
+                Source(part.path, f"muons/{name}", end - part.length, end)
+                for part, end in zip(parts, ends, strict=True)
+            ]
+            self._columns[name] = create_virtual_column(group, name, dtype, sources)
+            self._checksums[name] = joined_crc32((part.checksums[name], part.length * dtype.itemsize) for part in parts)
+        self.count = ends[-1]
+        self._raise_fault()
+
+    def _part(self, path: str | Path) -> _Part:
+        with _opened(path) as group:
+            if any(group[name].is_virtual for name in COLUMNS):
+                raise RefusedError(f"{path} keeps its muons in other files: name those instead")
+            relative = os.path.relpath(os.path.realpath(path), self.path.parent)
+            return _Part(Path(relative), len(group["pdg_id"]), _checksums(group))
 
     def _finish(self) -> None:
         """Write the attributes, and all that is in memory to the disk."""
         if not self._columns:
             self._create_columns(0)
+        for name, column in self._columns.items():
+            column.attrs["units"] = COLUMNS[name][1]
+            column.attrs[CHECKSUM] = np.uint32(self._checksums[name])
         self._file.attrs["format"] = FORMAT
         self._file.attrs["format_version"] = FORMAT_VERSION
         for name, value in self._all_attributes().items():
@@ -234,7 +288,7 @@ class MuonWriter:
                 self._file["muons"].attrs[name] = value
         self._file.close()
         self._raise_fault()
-        os.fsync(self._backing.fileno())
+        self._flush.finish()
 
     def _all_attributes(self) -> dict[str, object]:
         attributes = {"created_by": f"deepmuon-runtime {version('deepmuon-runtime')}", **self._attributes}
@@ -262,11 +316,10 @@ class MuonWriter:
         """Let go of the temporary file, and of its temporary name."""
         self._in_thread(self._close)
         self._thread.shutdown()
-        with suppress(OSError):  # never made, already in its place, or its folder is gone
-            self._partial.unlink()
+        self._remove()
 
     def _close(self) -> None:
-        for file in (getattr(self, "_file", None), getattr(self, "_backing", None)):
+        for file in (getattr(self, name, None) for name in ("_file", "_flush", "_backing")):
             if file is not None:
                 file.close()
 
@@ -316,7 +369,19 @@ def read_muons(path: str | Path, first: int = 0, count: int | None = None) -> Mu
         end = total if count is None else first + count
         if not 0 <= first <= end <= total:
             raise RefusedError(f"{path} holds {total} muons: those from {first} to {end} can't be read")
-        return Muons(**{name: group[name][first:end] for name in COLUMNS})
+        return Muons(**{name: _readable(group[name])[first:end] for name in COLUMNS})
+
+
+def read_checksums(path: str | Path) -> dict[str, int]:
+    """Read the CRC-32 of each column that a file says it has.
+
+    Raises
+    ------
+    RefusedError
+        If the file can't be read or is no muon file, or a column has none.
+    """
+    with _opened(path) as group:
+        return _checksums(group)
 
 
 def read_attributes(path: str | Path) -> dict[str, Any]:
@@ -359,6 +424,22 @@ def check_format(file: h5py.File, path: str | Path) -> None:
         raise RefusedError(f"{path} has format version {form_version}, and this release reads version {FORMAT_VERSION}")
 
 
+def _readable(column: h5py.Dataset) -> h5py.Dataset | VirtualColumn:
+    return VirtualColumn(column) if column.is_virtual else column
+
+
+def _checksums(group: h5py.Group) -> dict[str, int]:
+    return {name: int(group[name].attrs[CHECKSUM]) for name in COLUMNS}
+
+
+class _Part(NamedTuple):
+    """A file that holds muons of another one."""
+
+    path: Path
+    length: int
+    checksums: dict[str, int]
+
+
 def _checked(file: h5py.File, path: str | Path) -> h5py.Group:
     check_format(file, path)
     group = file.get("muons")
@@ -383,8 +464,6 @@ def python_value(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def reason(error: BaseException) -> str:
-    """Return the cause of an error in one line."""
-    if isinstance(error, OSError) and error.errno:
-        return os.strerror(error.errno)
-    return " ".join(str(error).split()) or type(error).__name__
+def _remove(path: Path) -> None:
+    with suppress(OSError):  # never made, already in its place, or its folder is gone
+        path.unlink()

@@ -69,7 +69,7 @@ def _at_most(largest: int, meaning: str) -> Callable[[int], None]:
 
 
 def _check_domain(domain: memoryview) -> None:
-    if domain not in (b"", b"ai.onnx"):  # two names of the standard one
+    if bytes(domain) not in (b"", b"ai.onnx"):  # two names of the standard one
         raise _BreachError(f"it has operators of the domain {_shown(domain)}, and should have standard ones only")
 
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import signal
 import subprocess
@@ -10,6 +11,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from zlib import crc32
 
 import h5py
 import numpy as np
@@ -19,7 +21,7 @@ from support.tiny_models import release, tiny_model
 from deepmuon_runtime import Generator, Muons, write_muons
 
 COMMAND = Path(sysconfig.get_path("scripts")) / "deepmuon-check"
-MANY = Path(__file__).parents[1] / "support" / "check_many.py"
+MANY = Path(__file__).parents[1] / "support" / "run_many.py"
 MUONS = 1000
 LONGEST = 600  # s, on any machine
 
@@ -129,6 +131,20 @@ def replace_column(name: str, **description: object) -> Damage:
     return damage
 
 
+def sign(muons: h5py.Group) -> None:
+    """Give the columns the checksums of what they hold now."""
+    for column in muons.values():
+        if isinstance(column, h5py.Dataset):
+            column.attrs["crc32"] = 0 if column.is_virtual else crc32(column[:].tobytes())
+
+
+def set_column_attribute(name: str, value: object) -> Damage:
+    def damage(muons: h5py.Group) -> None:
+        muons["u"].attrs[name] = value
+
+    return damage
+
+
 def shorten(muons: h5py.Group) -> None:
     muons["u"].resize((MUONS - 1,))
 
@@ -190,7 +206,7 @@ def several(muons: h5py.Group) -> None:
         (delete_column, ["column w is missing", "muons were not examined"]),
         (group_for_a_column, ["column w is missing", "muons were not examined"]),
         (link_to_another_file, ["column v is missing", "muons were not examined"]),
-        (virtual_column, ["column v keeps its numbers in other files", "muons were not examined"]),
+        (virtual_column, ["column v can't be read: its source ", "muons were not examined"]),
         (replace_column("u", data=np.zeros(MUONS)), ["column u is float64 of shape", "muons were not examined"]),
         (replace_column("u", data=np.zeros(MUONS, ">f4")), ["column u is >f4 of shape", "muons were not examined"]),
         (replace_column("u", data=np.zeros((MUONS, 1), "f4")), ["u is float32 of shape (1000, 1)", "not examined"]),
@@ -212,6 +228,7 @@ def several(muons: h5py.Group) -> None:
 def test_each_defect_is_named_in_a_line_with_its_first_muon(check, good_file, damage, expected):
     with h5py.File(good_file, "r+") as file:
         damage(file["muons"])
+        sign(file.get("muons", {}))
     code, lines, err = check(good_file)
     assert (code, err) == (3, "")
     found = defects(lines)
@@ -225,11 +242,62 @@ def test_a_defect_far_inside_is_counted_and_numbered_from_the_beginning(check, t
     Generator.open(file=model_file).write(path, 300_000, seed=1)
     with h5py.File(path, "r+") as file:
         file["muons/pdg_id"][200_000:270_000] = 1
+        sign(file["muons"])
     code, lines, _ = check(path)
     assert code == 3
     (defect,) = defects(lines)
     assert defect.startswith("muon 200000 has a charge other than -1 and +1 (kinetic energy ")
     assert defect.endswith("; so 70000 muons")
+
+
+@pytest.mark.parametrize("value", [None, 1.5, "0"])
+def test_a_column_without_its_checksum_is_a_defect(check, good_file, value):
+    with h5py.File(good_file, "r+") as file:
+        del file["muons/u"].attrs["crc32"]
+        if value is not None:
+            file["muons/u"].attrs["crc32"] = value
+    code, lines, _ = check(good_file)
+    assert (code, defects(lines)) == (
+        3,
+        [f"the column u has the checksum {value!r}, and should have a number, its CRC-32"],
+    )
+
+
+def bytes_of_columns(path: Path) -> list[tuple[str, int, int]]:
+    """Return the name, position and length of each stretch of a column in a file."""
+    with h5py.File(path) as file:
+        chunks = [
+            (name, column.id.get_chunk_info(number))
+            for name, column in file["muons"].items()
+            for number in range(column.id.get_num_chunks())
+        ]
+        sizes = {name: (column.dtype.itemsize, len(column), column.chunks[0]) for name, column in file["muons"].items()}
+    return [
+        (name, chunk.byte_offset, sizes[name][0] * min(sizes[name][2], sizes[name][1] - chunk.chunk_offset[0]))
+        for name, chunk in chunks
+    ]
+
+
+def test_a_flipped_bit_anywhere_in_a_column_is_found_and_its_column_named(endings, good_file, check):
+    """The first, the last and 30 other bytes of each column: 160 files."""
+    content = good_file.read_bytes()
+    random = np.random.default_rng(3)
+    positions = [
+        start + offset
+        for _, start, length in bytes_of_columns(good_file)
+        for offset in (0, length - 1, *random.integers(length, size=30))
+    ]
+
+    def flipped(position: int, bit: int) -> bytes:
+        copy = bytearray(content)
+        copy[position] ^= 1 << bit
+        return bytes(copy)
+
+    assert endings(flipped(position, random.integers(8)) for position in positions) == {3: len(positions)}
+    for name, start, _ in bytes_of_columns(good_file):
+        good_file.write_bytes(flipped(start, 0))  # of an energy or a direction: a muon as good as any
+        found = defects(check(good_file)[1])
+        assert any(line.startswith(f"the column {name} is not what was written: its CRC-32 is ") for line in found)
 
 
 @pytest.mark.parametrize("how", ["missing", "folder", "pipe", "empty", "text", "other HDF5", "later version"])
@@ -255,9 +323,9 @@ def test_what_is_no_muon_file_is_refused_in_one_line(check, tmp_path, how):
 def test_a_compressed_file_is_good(check, good_file):
     with h5py.File(good_file, "r+") as file:
         for name, column in list(file["muons"].items()):
-            numbers, units = column[:], column.attrs["units"]
+            numbers, attributes = column[:], dict(column.attrs)
             del file["muons"][name]
-            file["muons"].create_dataset(name, data=numbers, compression="gzip").attrs["units"] = units
+            file["muons"].create_dataset(name, data=numbers, compression="gzip").attrs.update(attributes)
     assert check(good_file)[0] == 0
 
 
@@ -299,8 +367,8 @@ def test_a_check_can_be_stopped(environment, tmp_path, number, code):
 def codes(paths: Iterable[Path], environment: dict[str, str]) -> Counter[int]:
     """Count the exit codes of checks, each in a process of its own."""
     done = subprocess.run(
-        [sys.executable, MANY],
-        input="\n".join(map(str, paths)),
+        [sys.executable, MANY, "check"],
+        input="".join(f"{json.dumps([str(path)])}\n" for path in paths),
         env={**environment, "OPENBLAS_NUM_THREADS": "1"},  # no thread may run when a process forks
         capture_output=True,
         text=True,
