@@ -51,7 +51,7 @@ def run_isolated(command: click.Command, name: str) -> NoReturn:
         code = 128 - code
     elif code < 0:
         ending = "took no end" if -code == signal.SIGPROF else f"was ended by {signal.Signals(-code).name}"
-        click.echo(f"{name}: the file is damaged so that reading it {ending}", err=True)
+        click.echo(f"{name}: a file is damaged so that reading it {ending}", err=True)
         code = REFUSED
     sys.exit(code)
 

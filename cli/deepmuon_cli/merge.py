@@ -7,7 +7,7 @@ from typing import NoReturn
 
 import click
 
-from deepmuon_cli.ending import run
+from deepmuon_cli.isolation import run_isolated, show_life
 
 __all__ = ["main", "merge"]
 
@@ -41,14 +41,14 @@ def merge(shards: tuple[Path, ...], output: Path, overwrite: bool, virtual: bool
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime.merge import merge_shards
 
-    number = merge_shards(shards, output, overwrite=overwrite, virtual=virtual)
+    number = merge_shards(shards, output, overwrite=overwrite, virtual=virtual, progress=lambda _: show_life())
     if not quiet:
         click.echo(f"{output}: {number:,} muons of {len(shards)} shard{'s' * (len(shards) > 1)}")
 
 
 def main() -> NoReturn:
     """Run `deepmuon-merge`."""
-    run(merge, NAME)
+    run_isolated(merge, NAME)
 
 
 if __name__ == "__main__":

@@ -76,7 +76,7 @@ class Report:
             self.cos_zenith_sum += float(muons.cos_zenith.sum(dtype=float))
 
 
-def check_file(path: str | Path, progress: Callable[[int], object] | None = None) -> Report:
+def check_file(path: str | Path, progress: Callable[[int], object] = lambda _: None) -> Report:
     """Check a muon file against its format, and each of its muons.
 
     The muons are read in pieces: the memory needed does not grow with their number. HDF5 can end the process, or
@@ -87,7 +87,7 @@ def check_file(path: str | Path, progress: Callable[[int], object] | None = None
     path
         A muon file, format version 1.
     progress
-        Called after each piece with the number of muons read since the last call.
+        Called again and again with the number of muons read since the last call.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def check_file(path: str | Path, progress: Callable[[int], object] | None = None
         raise RefusedError(f"{path} can't be read as a muon file: {reason(error)}") from error
 
 
-def _report(file: h5py.File, progress: Callable[[int], object] | None) -> Report:
+def _report(file: h5py.File, progress: Callable[[int], object]) -> Report:
     report = Report()
     group = member(file, "muons")
     if not isinstance(group, h5py.Group):
@@ -115,7 +115,7 @@ def _report(file: h5py.File, progress: Callable[[int], object] | None) -> Report
         report.model = _released_model(attributes.get("model_sha256"))
     report.attributes = sound_attributes(attributes)
     report.defects += attribute_defects(attributes, report.model)
-    columns = _sound_columns(group, report.attributes.get("count"), report.defects)
+    columns = _sound_columns(group, report.attributes.get("count"), report.defects, progress)
     if len(columns) == len(COLUMNS) and len({len(column) for column in columns.values()}) == 1:
         _examine_muons(columns, report, progress)
     else:
@@ -135,7 +135,9 @@ def _released_model(sha256: object) -> Model | None:
     return next((model for model in list_models() if model.sha256 == sha256), None)
 
 
-def _sound_columns(group: h5py.Group, count: int | None, defects: list[str]) -> dict[str, _Column]:
+def _sound_columns(
+    group: h5py.Group, count: int | None, defects: list[str], progress: Callable[[int], object]
+) -> dict[str, _Column]:
     """Return the columns that can be read as the format's, and note the defects of all."""
     sound = {}
     for name, (_, units) in COLUMNS.items():
@@ -144,13 +146,13 @@ def _sound_columns(group: h5py.Group, count: int | None, defects: list[str]) -> 
             defects.append(f"the column {name} is missing")
             continue
         try:
-            found = list(_column_defects(column, name))
+            found = list(_column_defects(column, name, progress))
         except READ_ERRORS as error:
             found = [f"can't be read: {reason(error)}"]
         attributes = _read_attributes(column, name, defects)
         checksum = attributes.get(CHECKSUM)
         if not found:
-            sound[name] = _Column(VirtualColumn(column) if column.is_virtual else column, checksum)
+            sound[name] = _Column(VirtualColumn(column, progress) if column.is_virtual else column, checksum)
         if not found and count is not None and len(column) != count:
             found = [f"has {len(column)} muons, and the attribute count is {count}"]
         if attributes.get("units") != units:
@@ -161,13 +163,13 @@ def _sound_columns(group: h5py.Group, count: int | None, defects: list[str]) -> 
     return sound
 
 
-def _column_defects(column: h5py.Dataset, name: str) -> Iterator[str]:
+def _column_defects(column: h5py.Dataset, name: str, progress: Callable[[int], object]) -> Iterator[str]:
     """Yield what keeps a column from being read."""
     dtype = COLUMNS[name][0]
     if column.dtype != dtype or column.ndim != 1:
         yield f"is {column.dtype} of shape {column.shape}, and should be {dtype} of one dimension"
     elif column.is_virtual:
-        yield from _source_defects(VirtualColumn(column), name)
+        yield from _source_defects(VirtualColumn(column), name, progress)
     elif column.external:
         yield "keeps its numbers in a file that is not HDF5"
     elif column.chunks is None:
@@ -177,13 +179,14 @@ def _column_defects(column: h5py.Dataset, name: str) -> Iterator[str]:
         yield f"holds {column.id.get_num_chunks()} of its {-(-len(column) // column.chunks[0])} chunks"
 
 
-def _source_defects(column: VirtualColumn, name: str) -> Iterator[str]:
+def _source_defects(column: VirtualColumn, name: str, progress: Callable[[int], object]) -> Iterator[str]:
     """Yield the first of the sources that can't be read, and how many others can't."""
     defects = []
     for source in column.sources:
+        progress(0)
         try:
             with opened_source(source) as stored:
-                defects += [f"its source {source.path} {defect}" for defect in _column_defects(stored, name)]
+                defects += [f"its source {source.path} {defect}" for defect in _column_defects(stored, name, progress)]
         except OSError as error:
             defects.append(reason(error))
     if defects:
@@ -208,7 +211,7 @@ class _Column:
         return len(self.stored)
 
 
-def _examine_muons(columns: dict[str, _Column], report: Report, progress: Callable[[int], object] | None) -> None:
+def _examine_muons(columns: dict[str, _Column], report: Report, progress: Callable[[int], object]) -> None:
     """Read all muons and note, for each fault, the first that has it and how many have."""
     model = report.model
     energies = POSITIVE_ENERGIES if model is None else (model.energy_min_gev, model.energy_max_gev)
@@ -226,8 +229,7 @@ def _examine_muons(columns: dict[str, _Column], report: Report, progress: Callab
             index = int(np.argmax(bad))
             known = faults.setdefault(fault, _Fault(first + index, describe(muons, index)))
             known.count += int(np.count_nonzero(bad))
-        if progress is not None:
-            progress(len(muons))
+        progress(len(muons))
     else:
         report.defects += _checksum_defects(columns)
     report.defects += (f"muon {known.first} {fault} ({known.muon}){known.others}" for fault, known in faults.items())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 from zlib import crc32
@@ -37,7 +37,7 @@ def merge_shards(
     *,
     overwrite: bool = False,
     virtual: bool = False,
-    progress: Callable[[int], object] | None = None,
+    progress: Callable[[int], object] = lambda _: None,
 ) -> int:
     """Join the shards of a run, in the order of their muons, to one file, which is that of the single run.
 
@@ -52,7 +52,7 @@ def merge_shards(
     virtual
         Whether the shards keep the muons, and the file only refers to them, by paths relative to its folder.
     progress
-        Called after each piece with the number of muons copied since the last call.
+        Called again and again with the number of muons copied since the last call.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def merge_shards(
     FailedError
         If writing fails, or another process writes `output` meanwhile.
     """
-    parts = sorted((_part(Path(path)) for path in paths), key=lambda part: (part.first, part.end))
+    parts = sorted((_part(path) for path in _one_by_one(paths, progress)), key=lambda part: (part.first, part.end))
     if not parts:
         raise RefusedError("there are no shards to be merged")
     for part in parts[1:]:
@@ -77,14 +77,20 @@ def merge_shards(
     described |= {"shard": str(WHOLE_RUN), "first": 0, "seed": np.uint64(described["seed"])}
     with MuonWriter(output, described, overwrite) as writer:
         if virtual:
-            writer.refer([part.path for part in parts])
+            writer.refer(_one_by_one([part.path for part in parts], progress))
         else:
             for part in parts:
                 _copy(part, writer, progress)
     return int(total)
 
 
-def _copy(part: _Part, writer: MuonWriter, progress: Callable[[int], object] | None) -> None:
+def _one_by_one(paths: Iterable[str | Path], progress: Callable[[int], object]) -> Iterator[Path]:
+    for path in paths:
+        progress(0)
+        yield Path(path)
+
+
+def _copy(part: _Part, writer: MuonWriter, progress: Callable[[int], object]) -> None:
     """Copy the muons of a shard, unless they are not those that were written to it."""
     found = dict.fromkeys(COLUMNS, 0)
     count = part.end - part.first
@@ -92,8 +98,7 @@ def _copy(part: _Part, writer: MuonWriter, progress: Callable[[int], object] | N
         muons = read_muons(part.path, first, min(PIECE, count - first))
         found = {name: crc32(getattr(muons, name).data, so_far) for name, so_far in found.items()}
         writer.append(muons)
-        if progress is not None:
-            progress(len(muons))
+        progress(len(muons))
     for name, expected in read_checksums(part.path).items():
         if found[name] != expected:
             raise RefusedError(f"{part.path} is damaged: the column {name} {unlike(found[name], expected)}")

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import os
 import weakref
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from datetime import datetime, timezone
@@ -193,7 +193,7 @@ class MuonWriter:
         with self._failures():
             self._in_thread(self._append, muons)
 
-    def refer(self, paths: Sequence[str | Path]) -> None:
+    def refer(self, paths: Iterable[str | Path]) -> None:
         """Take all muons from other muon files, which keep them, instead of `append`.
 
         The file finds them by their paths relative to its folder.
@@ -249,7 +249,7 @@ class MuonWriter:
         for name, (dtype, _) in COLUMNS.items():
             self._columns[name] = group.create_dataset(name, shape=(0,), maxshape=(None,), chunks=(chunk,), dtype=dtype)
 
-    def _refer(self, paths: Sequence[str | Path]) -> None:
+    def _refer(self, paths: Iterable[str | Path]) -> None:
         parts = [part for part in map(self._part, paths) if part.length]
         if not parts:
             return

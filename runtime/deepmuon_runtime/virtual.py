@@ -6,7 +6,7 @@ in several folders, and keeps every file open that it has read from. So the numb
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -70,6 +70,8 @@ class VirtualColumn:
     ----------
     column
         A virtual dataset of one dimension.
+    progress
+        Called with 0 before each source is read.
 
     Attributes
     ----------
@@ -82,7 +84,8 @@ class VirtualColumn:
         If it is not a row of whole columns of other files, in order and without gaps.
     """
 
-    def __init__(self, column: h5py.Dataset) -> None:
+    def __init__(self, column: h5py.Dataset, progress: Callable[[int], object] = lambda _: None) -> None:
+        self._progress = progress
         self._dtype = column.dtype
         self._length = len(column)
         self.sources = sorted(_sources(column), key=lambda source: source.first)
@@ -107,6 +110,7 @@ class VirtualColumn:
         for source in self.sources:
             start, stop = max(first, source.first), min(end, source.end)
             if start < stop:
+                self._progress(0)
                 with opened_source(source) as column:
                     values[start - first : stop - first] = column[start - source.first : stop - source.first]
         return values

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import subprocess
 import sysconfig
 from pathlib import Path
@@ -9,9 +10,10 @@ import numpy as np
 import pytest
 from support.tiny_models import tiny_model
 
-from deepmuon_runtime import Generator, Shard, read_attributes
+from deepmuon_runtime import Generator, RefusedError, Shard, read_attributes, read_muons
 
 COMMAND = Path(sysconfig.get_path("scripts")) / "deepmuon-merge"
+CHECK = Path(sysconfig.get_path("scripts")) / "deepmuon-check"
 MUONS = 300_001
 
 
@@ -20,7 +22,7 @@ def merge(tmp_path):
     """Run the installed command on files of a folder: exit code, stdout, stderr."""
 
     def run(*arguments: str) -> tuple[int, str, str]:
-        done = subprocess.run([COMMAND, *arguments], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+        done = subprocess.run([COMMAND, *arguments], cwd=tmp_path, capture_output=True, text=True, timeout=600)
         return done.returncode, done.stdout, done.stderr
 
     return run
@@ -112,3 +114,149 @@ def test_an_existing_output_is_replaced_only_where_asked(merge, generator, tmp_p
     assert (tmp_path / "all.h5").read_text() == "precious"
     assert merge(*names, "-o", "all.h5", "--overwrite", "-q") == (0, "", "")
     assert read_attributes(tmp_path / "all.h5")["count"] == 100
+
+
+def make_virtual(merge, generator: Generator, folder: Path, n: int = 1000) -> list[str]:
+    """Write three shards in a folder of their own, and a virtual file beside it."""
+    (folder / "shards 100%d").mkdir()
+    names = [
+        f"shards 100%d/{name}" for name in write_shards(generator, folder / "shards 100%d", "1/3", "2/3", "3/3", n=n)
+    ]
+    assert merge("--virtual", *names, "-o", "all.h5")[0] == 0
+    return names
+
+
+def check(path: Path) -> tuple[int, str]:
+    done = subprocess.run([CHECK, path.name], cwd=path.parent, capture_output=True, text=True, timeout=600)
+    return done.returncode, done.stdout
+
+
+@pytest.mark.parametrize("n", [2, MUONS])
+def test_a_virtual_file_is_that_of_the_single_run_for_everybody_who_reads_it(merge, generator, tmp_path, n):
+    make_virtual(merge, generator, tmp_path, n)
+    generator.write(tmp_path / "single.h5", n, seed=2**64 - 1)
+    assert (tmp_path / "all.h5").stat().st_size < 50_000
+    found = read_muons(tmp_path / "all.h5")
+    with h5py.File(tmp_path / "all.h5") as virtual, h5py.File(tmp_path / "single.h5") as single:
+        for name, column in single["muons"].items():
+            assert np.array_equal(virtual["muons"][name][:], column[:])
+            assert np.array_equal(getattr(found, name), column[:])
+            assert virtual["muons"][name].attrs["crc32"] == column.attrs["crc32"]
+            assert virtual["muons"][name].attrs["units"] == column.attrs["units"]
+    assert np.array_equal(read_muons(tmp_path / "all.h5", n // 4, n // 2).u, found.u[n // 4 : n // 4 + n // 2])
+    code, out = check(tmp_path / "all.h5")
+    assert (code, f"{n:,} muons examined" in out) == (0, True)
+    found, expected = read_attributes(tmp_path / "all.h5"), read_attributes(tmp_path / "single.h5")
+    for name in ("created", "command_line"):
+        del found[name], expected[name]
+    assert found == expected
+
+
+def test_a_virtual_file_and_its_shards_may_be_moved_together(merge, generator, tmp_path):
+    (tmp_path / "there").mkdir()
+    make_virtual(merge, generator, tmp_path)
+    for name in ("all.h5", "shards 100%d"):
+        (tmp_path / name).rename(tmp_path / "there" / name)
+    assert len(read_muons(tmp_path / "there" / "all.h5")) == 1000
+    assert check(tmp_path / "there" / "all.h5")[0] == 0
+
+
+def test_a_missing_shard_is_named_and_nobody_gets_its_muons(merge, generator, tmp_path, monkeypatch):
+    names = make_virtual(merge, generator, tmp_path)
+    elsewhere = tmp_path / "elsewhere"
+    (elsewhere / "shards 100%d").mkdir(parents=True)
+    (tmp_path / names[1]).rename(elsewhere / names[1])
+    monkeypatch.chdir(elsewhere)  # where HDF5 finds it by itself
+    code, out = check(tmp_path / "all.h5")
+    assert code == 3
+    assert f"defect: the column u can't be read: its source {names[1]} is missing" in out
+    with pytest.raises(RefusedError, match=r"its source .*part-2-of-3.* is missing"):
+        read_muons(tmp_path / "all.h5")
+    assert len(read_muons(tmp_path / "all.h5", 0, 333)) == 333  # of the first shard
+
+
+def change_muon(path: Path) -> None:
+    with h5py.File(path, "r+") as file:
+        file["muons/kinetic_energy"][7] = 1.5
+
+
+def shorten(path: Path) -> None:
+    with h5py.File(path, "r+") as file:
+        for column in file["muons"].values():
+            column.resize((300,))
+
+
+def make_doubles(path: Path) -> None:
+    with h5py.File(path, "r+") as file:
+        numbers = file["muons/u"][:].astype(float)
+        del file["muons/u"]
+        file["muons/u"] = numbers
+
+
+def refer_on(path: Path) -> None:
+    path.rename(path.with_suffix(".moved"))
+    with h5py.File(path, "w") as file:
+        for name, dtype in (("kinetic_energy", "f4"), ("u", "f4"), ("v", "f4"), ("w", "f4"), ("pdg_id", "i1")):
+            layout = h5py.VirtualLayout((333,), dtype)
+            layout[:] = h5py.VirtualSource(str(path.with_suffix(".moved")).replace("%", "%%"), f"muons/{name}", (333,))
+            file.create_virtual_dataset(f"muons/{name}", layout)
+
+
+def make_pipe(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (change_muon, "the column kinetic_energy (or one of its sources) is not what was written: its CRC-32 is"),
+        (shorten, "there is no column of 333 muons"),
+        (make_doubles, "is float64 of shape (333,), and should be float32 of one dimension"),
+        (refer_on, "the column keeps its numbers in other files"),
+        (make_pipe, "is missing"),
+        (lambda path: path.write_text("no HDF5"), "can't be read"),
+        (lambda path: path.write_bytes(path.read_bytes()[:5000]), "can't be read"),
+    ],
+)
+def test_a_changed_shard_is_found_by_the_check(merge, generator, tmp_path, change, reason):
+    names = make_virtual(merge, generator, tmp_path)
+    change(tmp_path / names[0])
+    code, out = check(tmp_path / "all.h5")
+    assert code == 3
+    assert reason in out
+
+
+def test_a_shard_of_another_seed_in_the_place_of_the_right_one_is_found(merge, generator, tmp_path):
+    names = make_virtual(merge, generator, tmp_path)
+    (other,) = write_shards(generator, tmp_path, "1/3", n=1000, seed=6)
+    (tmp_path / other).rename(tmp_path / names[0])
+    assert check(tmp_path / names[0])[0] == 0
+    code, out = check(tmp_path / "all.h5")
+    assert (code, out.count("(or one of its sources) is not what was written")) == (3, 5)
+
+
+def test_a_virtual_file_can_be_copied_but_not_be_referred_to(merge, generator, tmp_path):
+    make_virtual(merge, generator, tmp_path)
+    assert merge("all.h5", "-o", "copy.h5")[0] == 0
+    assert check(tmp_path / "copy.h5")[0] == 0
+    code, _, err = merge("--virtual", "all.h5", "-o", "virtual.h5")
+    assert (code, "keeps its muons in other files" in err) == (2, True)
+    assert not (tmp_path / "virtual.h5").exists()
+
+
+@pytest.mark.parametrize("options", [[], ["--virtual"]], ids=["copied", "virtual"])
+def test_shards_that_may_be_empty_are_joined(merge, generator, tmp_path, options):
+    names = write_shards(generator, tmp_path, "1/4", "2/4", "3/4", "4/4", n=2)
+    assert merge(*options, *names, "-o", "all.h5")[0] == 0
+    assert len(read_muons(tmp_path / "all.h5")) == 2
+    assert check(tmp_path / "all.h5")[0] == 0
+
+
+def test_a_damaged_shard_is_not_merged(merge, generator, tmp_path):
+    names = write_shards(generator, tmp_path, "1/2", "2/2", n=1000)
+    change_muon(tmp_path / names[1])
+    code, out, err = merge(*names, "-o", "all.h5")
+    assert (code, out) == (2, "")
+    assert f"{names[1]} is damaged: the column kinetic_energy is not what was written" in err
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*names, "tiny.onnx"])

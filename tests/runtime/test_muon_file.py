@@ -5,7 +5,9 @@ import os
 import subprocess
 import sys
 import textwrap
+import warnings
 from pathlib import Path
+from zlib import crc32
 
 import h5py
 import numpy as np
@@ -22,7 +24,7 @@ from deepmuon_runtime import (
     read_muons,
     write_muons,
 )
-from deepmuon_runtime.muon_file import PARTIAL_SUFFIX, check_output
+from deepmuon_runtime.muon_file import PARTIAL_SUFFIX, check_output, read_checksums
 
 PLANE = {"depth_m": 10.0, "medium": "G4_WATER"}
 COLUMNS = ("kinetic_energy", "u", "v", "w", "pdg_id")
@@ -327,3 +329,70 @@ def test_muons_that_are_not_there_are_refused(tmp_path, first, count):
     write_muons(tmp_path / "muons.h5", some_muons(10), PLANE)
     with pytest.raises(RefusedError, match="holds 10 muons"):
         read_muons(tmp_path / "muons.h5", first, count)
+
+
+def killed_writer(folder: Path) -> Path:
+    """Kill a process that writes muons.h5, and return what it left."""
+    program = f"""
+        import os
+        from deepmuon_runtime import MuonWriter
+        with MuonWriter("muons.h5", {PLANE}):
+            os.kill(os.getpid(), 9)
+    """
+    before = set(folder.iterdir())
+    subprocess.run([sys.executable, "-c", textwrap.dedent(program)], cwd=folder, check=False)
+    (left,) = set(folder.iterdir()) - before
+    return left
+
+
+def test_what_a_killed_writer_left_is_named_by_the_next_and_kept(tmp_path):
+    left = killed_writer(tmp_path)
+    with pytest.warns(UserWarning, match=f"a run that was killed left {left.name}, not complete: to be deleted"):
+        write_muons(tmp_path / "muons.h5", some_muons(3), PLANE)
+    assert set(tmp_path.iterdir()) == {left, tmp_path / "muons.h5"}
+
+
+def test_several_leftovers_are_counted(tmp_path):
+    for _ in range(3):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            killed_writer(tmp_path)
+    with pytest.warns(UserWarning, match="and 2 more, not complete"):
+        write_muons(tmp_path / "muons.h5", some_muons(3), PLANE)
+
+
+def test_living_writers_and_those_of_other_files_are_passed_over(tmp_path):
+    """A warning would be an error here."""
+    left = killed_writer(tmp_path)
+    left.rename(tmp_path / left.name.replace("muons", "other"))
+    (tmp_path / "muons.h5.mine").touch()
+    program = f"""
+        import sys
+        from deepmuon_runtime import MuonWriter
+        with MuonWriter("muons.h5", {PLANE}, overwrite=True):
+            print("ready", flush=True)
+            sys.stdin.read()
+    """
+    living = subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(program)], cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert living.stdout.readline() == b"ready\n"
+    write_muons(tmp_path / "muons.h5", some_muons(3), PLANE)
+    living.communicate()
+    assert living.returncode == 0
+
+
+def test_the_checksum_of_a_column_is_that_of_its_bytes_however_they_came(tmp_path):
+    muons = some_muons(5000)
+    with MuonWriter(tmp_path / "muons.h5", PLANE) as writer:
+        for first in range(0, 5000, 1100):
+            writer.append(muons[first : first + 1100])
+    assert read_checksums(tmp_path / "muons.h5") == {name: crc32(getattr(muons, name).tobytes()) for name in COLUMNS}
+
+
+def test_muons_of_another_type_or_order_in_memory_are_written_as_the_format_says(tmp_path):
+    muons = some_muons(100)
+    wide = Muons(**{name: np.repeat(getattr(muons, name).astype(float), 2)[::2] for name in COLUMNS})
+    write_muons(tmp_path / "muons.h5", wide, PLANE)
+    assert are_equal(read_muons(tmp_path / "muons.h5"), muons)
+    assert read_checksums(tmp_path / "muons.h5")["u"] == crc32(muons.u.tobytes())
