@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from deepmuon_runtime.bound_run import BoundRun
 
-__all__ = ["LARGEST_NUMBER", "Generator"]
+__all__ = ["LARGEST_NUMBER", "Generator", "checked_numbers"]
 
 LARGEST_NUMBER = 2**53
 """The most muons of one run."""
@@ -159,7 +159,7 @@ class Generator:
         FailedError
             If the model gives an unphysical muon.
         """
-        numbers, seed = _checked_numbers(n, first), _seed(seed)
+        numbers, seed = checked_numbers(n, first), _seed(seed)
         try:
             muons = Muons.empty(len(numbers))
         except (MemoryError, ValueError) as error:
@@ -190,7 +190,7 @@ class Generator:
         RefusedError, FailedError
             As `sample`.
         """
-        numbers, seed = _checked_numbers(n, first), _seed(seed)
+        numbers, seed = checked_numbers(n, first), _seed(seed)
 
         def chunk(part: range) -> Muons:
             muons = Muons.empty(len(part))
@@ -234,7 +234,7 @@ class Generator:
         FailedError
             If the model gives an unphysical muon, writing fails, or another process writes `path` meanwhile.
         """
-        total, seed = len(_checked_numbers(n)), _seed(seed)
+        total, seed = len(checked_numbers(n)), _seed(seed)
         numbers = shard.numbers(total)
         _check_space(check_output(path, overwrite).parent, len(numbers))
         described = {**self._attributes(seed, shard, total), **(attributes or {})}
@@ -375,8 +375,8 @@ def _usable_processors() -> int:
     return os.cpu_count() or 1
 
 
-def _checked_numbers(n: float, first: float = 0) -> range:
-    """Return the numbers of n muons from `first` on."""
+def checked_numbers(n: float, first: float = 0) -> range:
+    """Return the numbers of n muons from `first` on, or raise RefusedError where there are none."""
     for number, meaning in ((n, "number of muons"), (first, "number of a first muon")):
         if not (0 <= number <= LARGEST_NUMBER and number == int(number)):
             raise RefusedError(f"{number} is no {meaning}: a whole number from 0 to 2^53 is")
