@@ -11,7 +11,7 @@ import click
 if TYPE_CHECKING:
     from deepmuon_runtime import Shard
 
-__all__ = ["muon_number", "positive_number", "seed_number", "shard_number"]
+__all__ = ["muon_number", "number_from_zero", "positive_number", "seed_number", "shard_number"]
 
 
 def muon_number(text: str) -> int:
@@ -79,10 +79,28 @@ def positive_number(text: str) -> float:
     click.BadParameter
         If it is not a finite number above 0.
     """
-    try:
-        number = float(text)
-    except ValueError as error:
-        raise click.BadParameter(f"{text} is no number") from error
+    number = _number(text)
     if not 0 < number < math.inf:
         raise click.BadParameter(f"{text} is not a finite number above 0")
     return number
+
+
+def number_from_zero(text: str) -> float:
+    """Read a number of 0 or more.
+
+    Raises
+    ------
+    click.BadParameter
+        If it is not a finite number of 0 or more.
+    """
+    number = _number(text)
+    if not 0 <= number < math.inf:
+        raise click.BadParameter(f"{text} is not a finite number of 0 or more")
+    return number
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise click.BadParameter(f"{text} is no number") from error

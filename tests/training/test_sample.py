@@ -164,3 +164,42 @@ def test_a_part_of_a_sample_is_its_muons_with_all_that_is_known_of_them(tmp_path
     sample = Sample(MUONS, depth_m=10.0, source="the tests", provenance=("made",), rate=60.5)
     write_sample(tmp_path / "sample.h5", sample)
     assert_same(read_sample(tmp_path / "sample.h5", 1, 2), replace(sample, muons=MUONS[1:]))
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "reason"),
+    [
+        ("kinetic_energy", np.nan, "row 3: the muon has a kinetic energy that is negative or not finite"),
+        ("kinetic_energy", -1, "row 3: the muon has a kinetic energy that is negative or not finite"),
+        ("u", 0.1, "row 3: the muon has a direction whose length is not 1"),
+        ("v", np.nan, "row 3: the muon has a direction whose length is not 1"),
+        ("w", 1, "row 3: the muon does not go down"),
+        ("charge", 0, "row 3: the muon has the charge 0"),
+    ],
+)
+def test_a_row_of_crys_that_is_no_muon_is_named(cry, column, value, reason):
+    with h5py.File(cry, "r+") as file:
+        file["muons"][column][3] = value
+    with pytest.raises(RefusedError, match=reason):
+        read_cry(cry, slice(2, None))
+
+
+@pytest.mark.parametrize(
+    "column",
+    [np.zeros(5, np.float32), np.zeros((6, 2)), np.array([b"a"] * 6), 1.0],
+    ids=["short", "wide", "text", "one"],
+)
+def test_a_column_of_crys_of_another_shape_or_type_is_refused(cry, column):
+    without(cry, "kinetic_energy")
+    with h5py.File(cry, "r+") as file:
+        file["muons/kinetic_energy"] = column
+    with pytest.raises(RefusedError, match="is no CRY sample"):
+        read_cry(cry)
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf, "fast"])
+def test_a_rate_of_crys_that_is_none_is_refused(cry, rate):
+    with h5py.File(cry, "r+") as file:
+        file["muons"].attrs["rate_hz_per_m2"] = rate
+    with pytest.raises(RefusedError, match="is no CRY sample"):
+        read_cry(cry)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import ks_2samp
 
+from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import Muons
 from deepmuon_training.flux import sea_level_muons
+from deepmuon_training.sample import Sample
 from deepmuon_training.smoothing import COS_ZENITH_EDGES, ENERGY_CELL, StepSmoother
+from deepmuon_training.smoothing import smoothed as smoothed_sample
 
 N = 2_000_000
 CELLS = [ENERGY_CELL * np.arange(-15, 26), COS_ZENITH_EDGES]
@@ -95,6 +100,46 @@ def test_muons_that_were_not_fitted_are_smoothed_by_the_same_maps(stepped):
     # 1.95 sqrt(1/n + 1/m) is exceeded once in a thousand.
     assert distance(smooth, independent, "kinetic_energy") < 1.95 * np.sqrt(3 / N)
     assert distance(smooth, independent, "cos_zenith") < 1.95 * np.sqrt(3 / N)
+
+
+def test_muons_of_unknown_charge_share_one_map(stepped):
+    alike = replace(stepped, pdg_id=np.zeros(N, np.int8))
+    smooth = StepSmoother(alike)(alike)
+    np.testing.assert_array_equal(smooth.pdg_id, 0)
+    before, after = cells(stepped), cells(smooth)
+    full = before > 1000
+    assert np.sqrt(np.mean((after[full] / before[full] - 1) ** 2)) < 0.01
+
+
+def test_muons_of_a_charge_that_was_not_fitted_are_refused(stepped):
+    few = stepped[:100_000]
+    with pytest.raises(RefusedError, match="of a charge that those had not"):
+        StepSmoother(few[few.pdg_id == 13])(few)
+
+
+@pytest.mark.parametrize("count", [1, 1000, 3000])
+def test_too_few_muons_are_refused(stepped, count):
+    with pytest.raises(RefusedError, match="too few to take the steps of CRY's tables out"):
+        StepSmoother(stepped[stepped.pdg_id == 13][:count])
+
+
+def test_muons_of_two_energies_are_refused():
+    muons = sea_level_muons(20_000, seed=6)
+    energy = np.where(np.arange(20_000) % 2, 1.0, 100.0).astype(np.float32)
+    with pytest.raises(RefusedError, match="too few"):
+        StepSmoother(replace(muons, kinetic_energy=energy, pdg_id=np.full(20_000, 13, np.int8)))
+
+
+def test_a_smoothed_sample_says_so_and_keeps_its_rate_to_the_muons_that_are_left(stepped):
+    sample = Sample(stepped[:200_000], depth_m=0.0, source="the tests", rate=100.0, smoothed=False)
+    smooth = smoothed_sample(sample, StepSmoother(sample.muons))
+    assert smooth.smoothed
+    assert smooth.rate == pytest.approx(100.0 * len(smooth) / 200_000)
+    assert smooth.provenance == (
+        f"steps of CRY's tables taken out, {200_000 - len(smooth)} muons moved below 1 MeV dropped",
+    )
+    assert smooth.muons.kinetic_energy.min() >= 1e-3
+    assert smoothed_sample(replace(sample, rate=None), StepSmoother(sample.muons)).rate is None
 
 
 def test_order_charge_and_azimuth_stay(stepped, smoothed):

@@ -10,8 +10,9 @@ import h5py
 import numpy as np
 
 from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.muon_file import read_attributes, read_muons, write_muons
-from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
+from deepmuon_runtime.muon_file import READ_ERRORS, read_attributes, read_muons, reason, write_muons
+from deepmuon_runtime.muons import Muons
+from deepmuon_training.foreign_muons import numbered, pdg_id_of, refuse_unphysical
 
 __all__ = [
     "CRY_SHOWER_VARIANCE",
@@ -36,6 +37,8 @@ Muons of one shower come together, so their number varies by more than its squar
 times as large, m being the muons of a shower in CRY's 100 m box. Measured with CRY 1.7 on 120,000,000 muons; the
 scatter of the rates of 44 runs of 1,000,000 and 4,000,000 agrees.
 """
+
+CRY_COLUMNS = ("kinetic_energy", "u", "v", "w", "charge")
 
 
 @dataclass(frozen=True)
@@ -152,33 +155,39 @@ def read_cry(path: str | Path, part: slice = slice(None)) -> Sample:
     Raises
     ------
     RefusedError
-        If the file can't be read, lacks a column, or has no muon of 1 MeV in these rows.
+        If the file can't be read, lacks a column, has a row that is no muon, or no muon of 1 MeV in these rows.
     """
     try:
         with h5py.File(path) as file:
             group = file["muons"]
-            rows = slice(*part.indices(len(group["kinetic_energy"])))
-            energy = group["kinetic_energy"][rows] * np.float32(1e-3)
-            u, v, w = (group[name][rows] for name in "uvw")
-            pdg_id = np.where(group["charge"][rows] > 0, MU_PLUS, MU_MINUS).astype(np.int8)
+            columns = {name: group[name] for name in CRY_COLUMNS}
+            lengths = {column.shape for column in columns.values()}
+            if len(lengths) > 1 or columns["charge"].ndim != 1:
+                raise ValueError(f"the columns have the shapes {', '.join(map(str, sorted(lengths)))}")
+            rows = slice(*part.indices(len(columns["charge"])))
             rate = float(group.attrs["rate_hz_per_m2"])
-            relative = np.sqrt(CRY_SHOWER_VARIANCE / len(group["kinetic_energy"]))
+            if not 0 < rate < np.inf:
+                raise ValueError(f"rate_hz_per_m2 is {rate}")
             source = str(group.attrs["source"])
-    except (OSError, KeyError, ValueError, TypeError) as error:  # no HDF5, no such column, /muons is no group
-        reason = " ".join(str(error).split())
+            energy, u, v, w, charge = (column[rows] for column in columns.values())
+            total = len(columns["charge"])
+            place = numbered(path, "row", rows.start)
+            with np.errstate(over="ignore"):  # beyond float32: infinite, which is refused
+                muons = Muons.of(energy * np.float32(1e-3), u, v, w, pdg_id_of(charge, place))
+    except READ_ERRORS as error:
         raise RefusedError(
-            f"{path} is no CRY sample (HDF5, /muons with energy, direction and charge): {reason}"
+            f"{path} is no CRY sample (HDF5, /muons with energy, direction and charge): {reason(error)}"
         ) from error
-    everything = Muons(energy, u, v, w, pdg_id)
-    kept = energy >= MINIMUM_ENERGY
+    refuse_unphysical(muons, place, tolerance=2e-6)  # as they are: released models learned from these very numbers
+    kept = muons.kinetic_energy >= MINIMUM_ENERGY
     if not kept.any():
         raise RefusedError(f"{path} has no muon of at least 1 MeV in its rows {rows.start} to {rows.stop}")
     return Sample(
-        muons=everything[kept],
+        muons=muons[kept],
         depth_m=0.0,
         source=source,
         provenance=(f"{source}, rows {rows.start} to {rows.stop}, {np.sum(~kept)} below 1 MeV dropped",),
         rate=rate * float(np.mean(kept)),
-        rate_uncertainty=rate * float(relative),
+        rate_uncertainty=rate * float(np.sqrt(CRY_SHOWER_VARIANCE / total)),
         smoothed=False,
     )

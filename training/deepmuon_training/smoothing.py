@@ -19,9 +19,11 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.special import logit
 
-from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
+from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.muons import Muons
+from deepmuon_training.sample import MINIMUM_ENERGY, Sample
 
-__all__ = ["COS_ZENITH_EDGES", "ENERGY_CELL", "StepSmoother"]
+__all__ = ["COS_ZENITH_EDGES", "ENERGY_CELL", "StepSmoother", "smoothed"]
 
 ENERGY_CELL = 0.2
 """Width of CRY's energy cells, in decades; their edges are the whole multiples of it in log10(E/GeV)."""
@@ -32,6 +34,7 @@ COS_ZENITH_EDGES = np.linspace(0.0, 1.0, 21)
 _LOWEST, _HIGHEST = -20, 25  # energy cells that are kept apart: 1e-4 GeV to 1e5 GeV
 _FEWEST_FOR_ANGLES = 1000  # muons under which energy cells share one distribution of angles
 _POINTS_IN_CELL = 16
+_LEAST_COS_ZENITH = 1e-6  # a flat power law, as few muons have it, would go on to level muons
 _FAR = 60.0  # in the logarithm of a probability: beyond any sample
 
 Float = NDArray[np.float64]
@@ -105,12 +108,17 @@ class _ZenithMap:
         cell = cell.astype(int)
         low, high = self._stepped[group, cell], self._stepped[group, cell + 1]
         t = np.sqrt(-np.log(low + inside * (high - low)))
-        return np.exp(_bilinear(self._table, self._x, self._t, smooth_x, t))
+        return np.maximum(np.exp(_bilinear(self._table, self._x, self._t, smooth_x, t)), _LEAST_COS_ZENITH)
 
 
 def _group(counts: NDArray[np.int64]) -> list[tuple[int, int]]:
     """Ranges of energy cells; at both ends those with few muons are taken together."""
     rich = np.flatnonzero(counts >= _FEWEST_FOR_ANGLES)
+    if len(rich) < 3 or not counts[rich[0] : rich[-1]].all():
+        raise RefusedError(
+            f"{counts.sum():,} muons of one charge are too few to take the steps of CRY's tables out: three cells of "
+            f"{ENERGY_CELL} decade in energy must hold {_FEWEST_FOR_ANGLES:,} and more, and none between them be empty"
+        )
     first, last = rich[0], rich[-1]
     return [(0, first + 1), *((k, k + 1) for k in range(first + 1, last)), (last, len(counts))]
 
@@ -169,18 +177,32 @@ class StepSmoother:
     Parameters
     ----------
     muons : Muons
-        The training part of a CRY sample; the maps are fitted on these.
+        The training part of a CRY sample; the maps are fitted on these. Where their charge is not known (pdg_id 0), one
+        map is for all.
+
+    Raises
+    ------
+    RefusedError
+        If there are too few muons of a charge for a map.
     """
 
     def __init__(self, muons: Muons) -> None:
         self._maps = {}
-        for pdg_id in (MU_MINUS, MU_PLUS):
+        for pdg_id in np.unique(muons.pdg_id):
             x, cos_zenith = _coordinates(muons[muons.pdg_id == pdg_id])
             energy_map = _EnergyMap.fit(x)
             self._maps[pdg_id] = energy_map, _ZenithMap(x, cos_zenith, energy_map)
 
     def __call__(self, muons: Muons) -> Muons:
-        """Return the smoothed muons, in the order of the originals; azimuth and charge stay."""
+        """Return the smoothed muons, in the order of the originals; azimuth and charge stay.
+
+        Raises
+        ------
+        RefusedError
+            If there is a charge of which no map was fitted.
+        """
+        if not np.isin(muons.pdg_id, list(self._maps)).all():
+            raise RefusedError("there are muons of a charge that those had not on which the smoothing was fitted")
         energy, cos_zenith = np.empty(len(muons)), np.empty(len(muons))
         for pdg_id, (energy_map, zenith_map) in self._maps.items():
             mine = muons.pdg_id == pdg_id
@@ -189,6 +211,24 @@ class StepSmoother:
             energy[mine] = 10**smooth_x
             cos_zenith[mine] = zenith_map(x, c, smooth_x)
         return _with(muons, energy, cos_zenith)
+
+
+def smoothed(sample: Sample, smooth: StepSmoother) -> Sample:
+    """Take the steps of CRY's tables out of a sample, and what moves below 1 MeV with them.
+
+    Raises
+    ------
+    RefusedError
+        As `StepSmoother` when it is called.
+    """
+    muons = smooth(sample.muons)
+    kept = muons.kinetic_energy >= MINIMUM_ENERGY
+    return sample.then(
+        f"steps of CRY's tables taken out, {np.sum(~kept)} muons moved below 1 MeV dropped",
+        muons=muons[kept],
+        rate=None if sample.rate is None else sample.rate * float(np.mean(kept)),
+        smoothed=True,
+    )
 
 
 def _coordinates(muons: Muons) -> tuple[Float, Float]:
