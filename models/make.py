@@ -169,8 +169,10 @@ def evaluate_model(
     pictures.mkdir(parents=True, exist_ok=True)
     (EVALUATIONS / f"{path.stem}.json").write_text(evaluation.to_json())
     draw_pictures(evaluation, pictures, title=f"{model.architecture}, {depth} m")
+    more = "--more-cry cry_40M.h5 " if depth >= DEEP else ""
     command = (
-        f"python models/make.py --cry cry_sea_level.h5 --work work --depth {depth} --architecture {model.architecture}"
+        f"python models/make.py --cry cry_sea_level.h5 {more}--work work "
+        f"--depth {depth} --architecture {model.architecture}"
     )
     text = card(path, evaluation, command=command, provenance=sample.provenance, notes=notes)
     path.with_suffix(".md").write_text(text)

@@ -106,3 +106,11 @@ def test_muons_do_not_pile_up_at_the_ends(exponent):
         expected = 100_000 * ((0.9 * end) ** -exponent - ends[1]) / (ends[0] - ends[1])
         assert abs(np.sum(energies > 0.9 * end) - expected) < 4 * np.sqrt(expected)  # false alarms: 6e-5
         assert np.sum(energies >= end) <= 1
+
+
+def test_the_tails_of_a_small_sample_take_no_more_than_a_sixtieth_each(spectrum):
+    # A thousand of 6,000 sea-level muons reach down to 7 GeV, where no power law holds.
+    tails = PowerLawTails.fit(spectrum[:6000], energy_min=1e-3, energy_max=1e5)
+    assert tails.level == 100 / 6000
+    assert tails.high == np.sort(spectrum[:6000])[-101]
+    assert abs(tails.high_exponent - 2.5) < 4 * 2.5 / np.sqrt(100)  # false alarms 6e-5

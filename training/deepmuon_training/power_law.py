@@ -11,7 +11,10 @@ from scipy.optimize import brentq
 __all__ = ["TAIL_MUONS", "PowerLawTails", "fit_power_law"]
 
 TAIL_MUONS = 1000
-"""Each tail is fitted to, and begins at, so many muons from the end of the training sample."""
+"""Each tail is fitted to, and begins at, so many muons from the end of the training sample, if it is a large one."""
+
+LARGEST_TAIL = 1 / 60
+"""No tail takes a larger share of the sample: above 50 GeV the sea-level spectrum is near a power law, at 7 GeV not."""
 
 Float = NDArray[np.float64]
 
@@ -68,13 +71,14 @@ class PowerLawTails:
 
     @classmethod
     def fit(cls, kinetic_energy: Float, *, energy_min: float, energy_max: float) -> PowerLawTails:
-        """Fit both tails to the `TAIL_MUONS` lowest and highest energies [GeV] of a sample."""
+        """Fit both tails to the lowest and highest energies [GeV] of a sample."""
         n = len(kinetic_energy)
-        ordered = np.partition(kinetic_energy, [TAIL_MUONS, n - TAIL_MUONS - 1])
-        low, high = float(ordered[TAIL_MUONS]), float(ordered[n - TAIL_MUONS - 1])
-        low_exponent = fit_power_law(1 / ordered[:TAIL_MUONS], 1 / low, 1 / energy_min)
-        high_exponent = fit_power_law(ordered[-TAIL_MUONS:], high, energy_max)
-        return cls(TAIL_MUONS / n, low, high, low_exponent, high_exponent, energy_min, energy_max)
+        count = min(TAIL_MUONS, int(LARGEST_TAIL * n))
+        ordered = np.partition(kinetic_energy, [count, n - count - 1])
+        low, high = float(ordered[count]), float(ordered[n - count - 1])
+        low_exponent = fit_power_law(1 / ordered[:count], 1 / low, 1 / energy_min)
+        high_exponent = fit_power_law(ordered[-count:], high, energy_max)
+        return cls(count / n, low, high, low_exponent, high_exponent, energy_min, energy_max)
 
     def lowest(self, level: Float) -> Float:
         """Quantile of the energy at a cumulative probability below `level`."""

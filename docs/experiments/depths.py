@@ -1,0 +1,159 @@
+"""Rate, energy and zenith angle by depth, generators against muons carried by Geant4 (the paper's figures 5 to 7).
+
+    python docs/experiments/depths.py --samples FOLDER --layered FOLDER
+
+The first folder holds the held-out muons as testing-0m.h5 to testing-50m.h5 (`models/make.py` leaves them in
+WORK/samples); the other one the `quantile` generators of a layered run as quantile-0m.onnx and so on.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from report import COLOURS, write
+
+from deepmuon_runtime import Generator, Muons, list_models
+from deepmuon_training.histogram_scores import compare_cells, count_muons
+from deepmuon_training.kolmogorov_smirnov import kolmogorov_smirnov
+from deepmuon_training.plots import STYLE
+from deepmuon_training.sample import Sample, read_sample
+
+GENERATED = 20_000_000
+ENERGY_EDGES = 10.0 ** np.linspace(-2, 3.5, 56)
+COS_EDGES = np.linspace(0, 1, 41)
+COMPARED = (10, 50)
+"""Depths [m] whose spectra are drawn."""
+
+FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
+Float = NDArray[np.float64]
+
+
+@click.command(help=__doc__)
+@click.option("--samples", required=True, type=FOLDER, help="Where the held-out muons lie.")
+@click.option("--layered", required=True, type=FOLDER, help="Where the generators of a layered run lie.")
+def main(samples: Path, layered: Path) -> None:
+    """Compare released and layered generators with the direct muons of each depth."""
+    depths = sorted({round(model.depth_m) for model in list_models()})
+    numbers, drawn = {}, {}
+    for depth in depths:
+        direct = read_sample(samples / f"testing-{depth}m.h5")
+        generators = {
+            "released": Generator.open(depth, architecture="quantile"),
+            "layered": Generator.open(file=layered / f"quantile-{depth}m.onnx"),
+        }
+        muons = {name: generator.sample(GENERATED, seed=1) for name, generator in generators.items()}
+        numbers[depth] = {
+            "direct": moments(direct.muons, direct.rate),
+            **{
+                name: moments(muons[name], generators[name].model.rate_hz_per_m2) | score(muons[name], direct)
+                for name in generators
+            },
+        }
+        drawn[depth] = {"direct": spectra(direct.muons), **{name: spectra(muons[name]) for name in muons}}
+    write("depths", {"generated": GENERATED, "depths": numbers}, table(numbers), draw(numbers, drawn))
+
+
+def moments(muons: Muons, rate: float | None) -> dict[str, float | None]:
+    """Rate, and means with their standard errors."""
+    energy = muons.kinetic_energy.astype(np.float64)
+    x = (9000 * energy + 1) ** (1 / 9)
+    zenith = np.degrees(np.arccos(np.minimum(muons.cos_zenith.astype(np.float64), 1)))
+    scale = 1 / np.sqrt(len(muons))
+    return {
+        "muons": len(muons),
+        "rate": rate,
+        "mean_energy": float(energy.mean()),
+        "mean_energy_error": float(energy.std() * scale),
+        "median_energy": float(np.median(energy)),
+        "mean_box_cox": float(x.mean()),
+        "mean_zenith": float(zenith.mean()),
+        "mean_zenith_error": float(zenith.std() * scale),
+    }
+
+
+def score(muons: Muons, direct: Sample) -> dict[str, float | None]:
+    """Distances to the direct muons."""
+    cells = compare_cells(count_muons(muons), count_muons(direct.muons))
+    energy = kolmogorov_smirnov(muons.kinetic_energy, direct.muons.kinetic_energy)
+    cosine = kolmogorov_smirnov(muons.cos_zenith, direct.muons.cos_zenith)
+    return {
+        "chi2_ndf": cells.chi_square.per_ndf,
+        "delta": cells.delta,
+        "ks_energy": energy.distance,
+        "ks_cos_zenith": cosine.distance,
+        "ks_noise": energy.mean_noise,
+    }
+
+
+def spectra(muons: Muons) -> tuple[Float, Float]:
+    """Fractions of the muons in bins of the energy, and of cos zenith."""
+    return (
+        np.histogram(muons.kinetic_energy, ENERGY_EDGES)[0] / len(muons),
+        np.histogram(muons.cos_zenith, COS_EDGES)[0] / len(muons),
+    )
+
+
+def table(numbers: dict[int, dict[str, dict[str, float | None]]]) -> list[tuple[str, ...]]:
+    """One row a depth and kind."""
+    rows = [
+        ("depth", "muons of", "rate / (m² s)", "mean energy / GeV", "mean zenith", "chi2/ndf", "delta", "KS energy")
+    ]
+    for depth, kinds in numbers.items():
+        for name, of in kinds.items():
+            scores = (
+                (f"{of['chi2_ndf']:.2f}", f"{of['delta']:.2%}", f"{of['ks_energy']:.5f}")
+                if "delta" in of
+                else ("", "", "")
+            )
+            rate = "unknown" if of["rate"] is None else f"{of['rate']:.3f}"
+            energy = f"{of['mean_energy']:.3f} ± {of['mean_energy_error']:.3f}"
+            zenith = f"{of['mean_zenith']:.2f}° ± {of['mean_zenith_error']:.2f}°"
+            rows.append((f"{depth} m", name, rate, energy, zenith, *scores))
+    return rows
+
+
+def draw(
+    numbers: dict[int, dict[str, dict[str, float | None]]], drawn: dict[int, dict[str, tuple[Float, Float]]]
+) -> Figure:
+    """Draw rate, mean energy and mean zenith by depth, and the spectra of two depths with their ratios to direct."""
+    depths = list(numbers)
+    with rc_context(STYLE):
+        figure = Figure(figsize=(10.5, 9.0), layout="constrained")
+        top, bottom = figure.subfigures(2, 1, height_ratios=[3, 5])
+        labels = {"rate": "rate / (m² s)", "mean_energy": "mean energy / GeV", "mean_zenith": "mean zenith / °"}
+        for axes, (key, label) in zip(top.subplots(1, 3), labels.items(), strict=True):
+            for name, marker, color in zip(("direct", "released", "layered"), "o+x", ("black", *COLOURS), strict=False):
+                values = [numbers[depth][name][key] for depth in depths]
+                axes.plot(depths, values, marker, color=color, label=name, fillstyle="none")
+            axes.set(xlabel="depth / m", ylabel=label)
+        top.axes[0].set(yscale="log")
+        top.axes[0].legend()
+        grid = bottom.subplots(2, 4, height_ratios=[5, 2])
+        shown = [depth for depth in COMPARED if depth in drawn]
+        for k, depth in enumerate(shown):
+            for column, edges, log in ((0, ENERGY_EDGES, True), (1, COS_EDGES, False)):
+                draw_spectrum(grid[:, 2 * k + column], {n: s[column] for n, s in drawn[depth].items()}, edges, log)
+                grid[0, 2 * k + column].set(title=f"{depth} m")
+        grid[0, 0].legend(fontsize="small")
+    return figure
+
+
+def draw_spectrum(pair: NDArray[np.object_], curves: dict[str, Float], edges: Float, log: bool) -> None:
+    """Draw fractions above, ratios to the direct ones below."""
+    upper, lower = pair
+    direct = np.where(curves["direct"] > 1e-4, curves["direct"], np.nan)
+    for (name, values), color in zip(curves.items(), ("black", *COLOURS), strict=False):
+        upper.stairs(values, edges, baseline=None, color=color, label=name)
+        lower.stairs(values / direct, edges, baseline=None, color=color)
+    upper.set(yscale="log", xscale="log" if log else "linear", ylim=(1e-6, None))
+    lower.set(xscale="log" if log else "linear", ylim=(0.9, 1.1))
+    lower.set(xlabel="kinetic energy / GeV" if log else "cos zenith")
+
+
+if __name__ == "__main__":
+    main()
