@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import subprocess
 import sys
 import tempfile
@@ -23,8 +22,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from deepmuon_runtime.errors import FailedError
+from deepmuon_training.geant4_data import without_data_sets
 
-__all__ = ["CHUNK", "EXIT", "PRIMARY", "SlabJob", "chunk_file", "run_geant4"]
+__all__ = ["CHUNK", "EXIT", "PRIMARY", "SlabJob", "chunk_file", "run_geant4", "sideways_file"]
 
 CHUNK = 20_000
 """Primaries in a chunk. Each has a seed of its own, so that the result doesn't depend on who carries it."""
@@ -33,9 +33,9 @@ PRIMARY = np.dtype([("energy", "f4"), ("u", "f4"), ("v", "f4"), ("w", "f4"), ("p
 """A muon that enters the slab by its upper plane: kinetic energy [GeV], direction, PDG number."""
 
 EXIT = np.dtype([("row", "i8"), ("energy", "f4"), ("u", "f4"), ("v", "f4"), ("w", "f4")])
-"""A muon that leaves the slab: its row among the primaries, kinetic energy [GeV], direction."""
+"""A muon that leaves the slab by its upper or lower plane: its row among the primaries, kinetic energy [GeV],
+direction."""
 
-_DATA_SETS = ("G4ENSDFSTATEDATA", "G4LEDATA", "G4LEVELGAMMADATA", "G4PARTICLEXSDATA", "G4RADIOACTIVEDATA")
 _SECONDS_BETWEEN_LOOKS = 0.1
 
 
@@ -46,16 +46,22 @@ class SlabJob:
     Parameters
     ----------
     material : str
-        Geant4's (NIST) name of what it is made of.
+        Name of what it is made of: one of Geant4's (NIST), or standard_rock.
     thickness : float
         Its thickness in m.
     seed : int
         Seed of the random numbers.
+    density : float, optional
+        Density of the material in g/cm3, if not its own.
+    box : (float, float), optional
+        Widths of the slab along x and y in m; a slab without them is infinite.
     """
 
     material: str
     thickness: float
     seed: int
+    density: float | None = None
+    box: tuple[float, float] | None = None
 
     def write(self, folder: Path) -> None:
         """Write ``job.json``."""
@@ -76,7 +82,14 @@ def chunk_file(folder: Path, chunk: int) -> Path:
     return folder / f"chunk-{chunk:06d}.npy"
 
 
-def run_geant4(primaries: NDArray[np.void], job: SlabJob, processes: int, progress: bool) -> NDArray[np.void]:
+def sideways_file(folder: Path, chunk: int) -> Path:
+    """Return the path of the number of muons of a chunk that left the slab by its sides."""
+    return folder / f"sideways-{chunk:06d}.npy"
+
+
+def run_geant4(
+    primaries: NDArray[np.void], job: SlabJob, processes: int, progress: bool
+) -> tuple[NDArray[np.void], int]:
     """Carry muons through a slab in several processes.
 
     Parameters
@@ -93,7 +106,9 @@ def run_geant4(primaries: NDArray[np.void], job: SlabJob, processes: int, progre
     Returns
     -------
     EXIT [m]
-        The muons that left the slab, upwards or downwards, in the order of the primaries.
+        The muons that left the slab by its upper or lower plane, in the order of the primaries.
+    int
+        How many left it by its sides.
 
     Raises
     ------
@@ -111,7 +126,8 @@ def run_geant4(primaries: NDArray[np.void], job: SlabJob, processes: int, progre
             shares = [range(first, chunks, processes) for first in range(processes)]
             _wait([running.enter_context(_Process(folder, share)) for share in shares], bar)
         found = [np.load(chunk_file(folder, chunk)) for chunk in range(chunks)]
-    return np.concatenate([np.empty(0, EXIT), *found])
+        sideways = sum(int(np.load(sideways_file(folder, chunk))) for chunk in range(chunks))
+    return np.concatenate([np.empty(0, EXIT), *found]), sideways
 
 
 def _wait(processes: list[_Process], bar: tqdm) -> None:
@@ -120,17 +136,6 @@ def _wait(processes: list[_Process], bar: tqdm) -> None:
         bar.update(min(done, bar.total) - bar.n)
         time.sleep(_SECONDS_BETWEEN_LOOKS)
     bar.update(bar.total - bar.n)
-
-
-def _environment(folder: Path) -> dict[str, str]:
-    """Return the environment in which Geant4 starts without its data sets, asking for none.
-
-    Muon electromagnetic physics needs none of them; where the user has set them, they stay.
-    """
-    nothing = folder / "no-data"
-    nothing.mkdir(exist_ok=True)
-    (nothing / "ENSDFSTATE.dat").touch()  # the table of ions opens it, and is content with an empty one
-    return {**dict.fromkeys(("GEANT4_DATA_DIR", *_DATA_SETS), str(nothing)), **os.environ}
 
 
 class _Process:
@@ -144,7 +149,7 @@ class _Process:
         with self.log.open("wb") as log:
             self.process = subprocess.Popen(
                 [sys.executable, "-m", "deepmuon_training.geant4_slab", str(folder), *which],
-                env=_environment(folder),
+                env=without_data_sets(),
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,

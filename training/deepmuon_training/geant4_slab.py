@@ -1,12 +1,8 @@
 """Muons through a slab of matter: the program of one Geant4 process.
 
 ``python -m deepmuon_training.geant4_slab FOLDER START STOP STEP``, as `deepmuon_training.geant4_processes`
-runs it, carries the chunks range(START, STOP, STEP) of the job in a folder.
-
-Physics: Geant4's standard electromagnetic processes of the muon (ionisation, bremsstrahlung, pair
-production, multiple and single Coulomb scattering) and its decay. They compute their own tables, so no
-Geant4 data set is needed. Muon-nuclear interaction is left out. Only the muon is followed: its secondaries
-are killed as they are born.
+runs it, carries the chunks range(START, STOP, STEP) of the job in a folder. The physics is that of
+`deepmuon_training.geant4_physics`.
 """
 
 from __future__ import annotations
@@ -20,22 +16,21 @@ import geant4_pybind as g4
 import numpy as np
 from numpy.typing import NDArray
 
-from deepmuon_training.geant4_processes import CHUNK, EXIT, PRIMARY, SlabJob, chunk_file
+from deepmuon_runtime.muons import Muons
+from deepmuon_training.geant4_materials import build_material
+from deepmuon_training.geant4_physics import MuonPhysics, NoSecondaries, initialize
+from deepmuon_training.geant4_processes import CHUNK, EXIT, SlabJob, chunk_file, sideways_file
+from deepmuon_training.geant4_source import MuonSource
 
 __all__ = ["SlabKernel", "main"]
 
+_COLUMNS = ("energy", "u", "v", "w", "pdg_id")  # of PRIMARY, in the order of Muons
+
 _MUONS_PER_EVENT = 2000  # what Python does per event then costs nothing
-_HALF_WIDTH = 50 * g4.km  # as good as infinite: a muon of 100 TeV goes some 20 km
-_ENTRY_DEPTH = 1e-6 * g4.mm  # primaries start this far under the upper plane, clear of the boundary
+_INFINITE = 1e5  # m, as good as infinite: a muon of 100 TeV goes some 20 km
+_ENTRY_DEPTH = 1e-9  # m; primaries start this far under the upper plane, clear of the boundary
 
-_PRODUCTION_CUT = 100 * g4.mm
-"""Secondaries of shorter range are part of the muon's continuous loss. A cut of 1 mm gives the same mean energy
-(10 GeV muons through 10 m of water: 7.519 +- 0.001 and 7.521 +- 0.005 GeV) and scattering angle within 1 %,
-at a tenth of the speed."""
-
-_STEP_OVER_RANGE, _FINAL_RANGE = 0.02, 10 * g4.mm
-"""Steps are this fraction of the muon's range, until that is short. With Geant4's own 0.2 a 10 GeV muon
-crosses 10 m of water in two or three steps, and its scattering angle comes out 4 % too small."""
+_TOLERANCE = 1e-6 * g4.mm  # a thousand times Geant4's own, of the place of a surface
 
 
 class SlabKernel:
@@ -45,27 +40,32 @@ class SlabKernel:
     ----------
     job : SlabJob
         The slab.
+
+    Attributes
+    ----------
+    sideways : int
+        Muons of the last chunk that left the slab by its sides.
     """
 
     def __init__(self, job: SlabJob) -> None:
-        self._recorder = _ExitRecorder()
+        self.sideways = 0
+        self._recorder = _ExitRecorder(job.thickness)
         self._manager = g4.G4RunManagerFactory.CreateRunManager(g4.G4RunManagerType.SerialOnly)
         # Geant4 holds bare pointers to these: they live as long as the kernel.
-        self._slab, self._physics = _Slab(job, self._recorder), _MuonPhysics()
+        self._slab, self._physics = _Slab(job, self._recorder), MuonPhysics()
         self._actions = _Actions(job, self._recorder)
         for part in (self._slab, self._physics, self._actions):
             self._manager.SetUserInitialization(part)
-        g4.G4EmParameters.Instance().SetStepFunctionMuHad(_STEP_OVER_RANGE, _FINAL_RANGE)
-        self._manager.Initialize()
-        # A cut set in the physics list has no effect here.
-        g4.G4UImanager.GetUIpointer().ApplyCommand(f"/run/setCut {_PRODUCTION_CUT / g4.mm} mm")
+        initialize(self._manager)
 
     def carry(self, primaries: NDArray[np.void], seed: int) -> NDArray[np.void]:
-        """Return the muons (EXIT [m]) that leave the slab, of those (PRIMARY [n]) that enter it, in order."""
+        """Return those (EXIT [m]) of the muons (PRIMARY [n]) that leave the slab by its planes, in their order."""
         self._recorder.exits = []
-        self._actions.primaries.muons = primaries
+        self._recorder.sideways = 0
+        self._actions.primaries.load(Muons(*(primaries[name] for name in _COLUMNS)))
         g4.G4Random.setTheSeed(seed)
         self._manager.BeamOn(-(-len(primaries) // _MUONS_PER_EVENT))
+        self.sideways = self._recorder.sideways
         exits = np.array(self._recorder.exits, EXIT)
         return exits[np.argsort(exits["row"])]
 
@@ -79,16 +79,18 @@ class _Slab(g4.G4VUserDetectorConstruction):
 
     def Construct(self) -> g4.G4VPhysicalVolume:  # noqa: N802
         self.volumes: list[g4.G4LogicalVolume | g4.G4VPhysicalVolume] = []  # kept from Python's garbage collection
-        world = self.box("world", "G4_Galactic", margin=1 * g4.m, mother=None)
-        self.box("slab", self.job.material, margin=0, mother=world.GetLogicalVolume())
+        vacuum = build_material("G4_Galactic")
+        world = self.box("world", vacuum, margin=1 * g4.m, mother=None)
+        matter = build_material(self.job.material, self.job.density)
+        self.box("slab", matter, margin=0, mother=world.GetLogicalVolume())
         return world
 
-    def box(self, name: str, material: str, margin: float, mother: g4.G4LogicalVolume | None) -> g4.G4VPhysicalVolume:
-        side, half = _HALF_WIDTH + margin, self.job.thickness / 2 * g4.m + margin
-        stuff = g4.G4NistManager.Instance().FindOrBuildMaterial(material)
-        if stuff is None:
-            sys.exit(f"Geant4 knows no material {material}")
-        logical = g4.G4LogicalVolume(g4.G4Box(name, side, side, half), stuff, name)
+    def box(
+        self, name: str, material: g4.G4Material, margin: float, mother: g4.G4LogicalVolume | None
+    ) -> g4.G4VPhysicalVolume:
+        widths = (*(self.job.box or (_INFINITE, _INFINITE)), self.job.thickness)
+        halves = [width / 2 * g4.m + margin for width in widths]
+        logical = g4.G4LogicalVolume(g4.G4Box(name, *halves), material, name)
         placed = g4.G4PVPlacement(None, g4.G4ThreeVector(), logical, name, mother, False, 0)
         self.volumes += [logical, placed]
         return placed
@@ -101,44 +103,24 @@ class _Slab(g4.G4VUserDetectorConstruction):
 class _ExitRecorder(g4.G4VSensitiveDetector):
     """Writes down each muon as it steps out of the slab, and ends it there."""
 
-    def __init__(self) -> None:
+    source: MuonSource
+
+    def __init__(self, thickness: float) -> None:
         super().__init__("exits")
-        self.first_row = 0  # of the current event
+        self.beside = thickness / 2 * g4.m - _TOLERANCE  # |z| is smaller where a muon leaves by a side
         self.exits: list[tuple[int, float, float, float, float]] = []  # as in EXIT
+        self.sideways = 0
 
     def ProcessHits(self, step: g4.G4Step, history: g4.G4TouchableHistory) -> bool:  # noqa: N802
         track, boundary = step.GetTrack(), step.GetPreStepPoint()
-        row = self.first_row + track.GetTrackID() - 1
+        track.SetTrackStatus(g4.fStopAndKill)
+        if abs(boundary.GetPosition().z) < self.beside:
+            self.sideways += 1
+            return True
+        row = self.source.first + track.GetTrackID() - 1
         direction = boundary.GetMomentumDirection()
         self.exits.append((row, boundary.GetKineticEnergy() / g4.GeV, direction.x, direction.y, direction.z))
-        track.SetTrackStatus(g4.fStopAndKill)
         return True
-
-
-class _MuonPhysics(g4.G4VModularPhysicsList):
-    """Electromagnetic physics and decay, of muons only."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        for constructor in (g4.G4EmStandardPhysics(), g4.G4DecayPhysics(), _MuonsOnly("muons only")):
-            self.RegisterPhysics(constructor)
-
-
-class _MuonsOnly(g4.G4VPhysicsConstructor):
-    """Takes from all other particles every process but transportation: some would ask for data sets."""
-
-    def ConstructParticle(self) -> None:  # noqa: N802
-        """Construct nothing: the other constructors have done it."""
-
-    def ConstructProcess(self) -> None:  # noqa: N802
-        table = g4.G4ParticleTable.GetParticleTable()
-        for particle in [table.GetParticle(index) for index in range(table.entries())]:
-            manager = particle.GetProcessManager()
-            if manager is None or particle.GetParticleName() in ("mu-", "mu+"):
-                continue
-            for process in list(manager.GetProcessList()):
-                if process.GetProcessName() != "Transportation":
-                    manager.RemoveProcess(process)
 
 
 class _Actions(g4.G4VUserActionInitialization):
@@ -147,39 +129,24 @@ class _Actions(g4.G4VUserActionInitialization):
         self.job, self.recorder = job, recorder
 
     def Build(self) -> None:  # noqa: N802
-        self.primaries, self.no_secondaries = _Primaries(self.job, self.recorder), _NoSecondaries()
+        self.primaries, self.no_secondaries = _Primaries(self.job), NoSecondaries()
+        self.recorder.source = self.primaries
         self.SetUserAction(self.primaries)
         self.SetUserAction(self.no_secondaries)
 
 
-class _Primaries(g4.G4VUserPrimaryGeneratorAction):
-    """Shoots the muons of a chunk."""
+class _Primaries(MuonSource):
+    """Shoots the muons of a chunk, at one place of an infinite slab, uniformly over the upper face of a finite one."""
 
-    def __init__(self, job: SlabJob, recorder: _ExitRecorder) -> None:
-        super().__init__()
-        self.muons: NDArray[np.void] = np.empty(0, PRIMARY)
-        self.recorder = recorder
+    def __init__(self, job: SlabJob) -> None:
+        height = job.thickness / 2 - _ENTRY_DEPTH
+        super().__init__([], height=height, area=job.box or (0.0, 0.0), muons_per_event=_MUONS_PER_EVENT)
         self.parent = os.getppid()
-        self.guns = {pdg_id: g4.G4ParticleGun(1) for pdg_id in (13, -13)}
-        entry = g4.G4ThreeVector(0, 0, job.thickness / 2 * g4.m - _ENTRY_DEPTH)
-        for pdg_id, gun in self.guns.items():
-            gun.SetParticleDefinition(g4.G4ParticleTable.GetParticleTable().FindParticle(pdg_id))
-            gun.SetParticlePosition(entry)
 
     def GeneratePrimaries(self, event: g4.G4Event) -> None:  # noqa: N802
         if os.getppid() != self.parent:  # who wanted the muons is gone
             os._exit(1)
-        self.recorder.first_row = first = event.GetEventID() * _MUONS_PER_EVENT
-        for energy, u, v, w, pdg_id in self.muons[first : first + _MUONS_PER_EVENT].tolist():
-            gun = self.guns[pdg_id]
-            gun.SetParticleEnergy(energy * g4.GeV)
-            gun.SetParticleMomentumDirection(g4.G4ThreeVector(u, v, w))
-            gun.GeneratePrimaryVertex(event)
-
-
-class _NoSecondaries(g4.G4UserStackingAction):
-    def ClassifyNewTrack(self, track: g4.G4Track) -> g4.G4ClassificationOfNewTrack:  # noqa: N802
-        return g4.fUrgent if track.GetParentID() == 0 else g4.fKill
+        super().GeneratePrimaries(event)
 
 
 def main(folder: Path, chunks: range) -> None:
@@ -192,6 +159,7 @@ def main(folder: Path, chunks: range) -> None:
         first = chunk * CHUNK
         exits = kernel.carry(primaries[first : first + CHUNK], job.chunk_seed(chunk))
         exits["row"] += first
+        np.save(sideways_file(folder, chunk), kernel.sideways)
         unfinished = folder / f"unfinished-{chunk}.npy"
         np.save(unfinished, exits)
         unfinished.replace(chunk_file(folder, chunk))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
 from deepmuon_training.geant4_processes import PRIMARY, SlabJob, run_geant4
+from deepmuon_training.material import check_material, medium
 from deepmuon_training.sample import MINIMUM_ENERGY, Sample
 
 __all__ = ["Transported", "below_slab", "transport"]
@@ -34,7 +35,7 @@ _UNIT_TOLERANCE = 1e-4  # of a direction's length: text formats have few digits
 
 @dataclass(frozen=True)
 class Transported:
-    """What became of a sample in a slab; started = survivors + screened + stopped + upward + below_minimum.
+    """What became of a sample in a slab; started = survivors + screened + stopped + sideways + upward + below_minimum.
 
     Parameters
     ----------
@@ -47,6 +48,8 @@ class Transported:
         Left out beforehand, because their energy can't carry them through.
     stopped : int
         Stopped or decayed in the slab.
+    sideways : int
+        Left a slab of finite width by its sides.
     upward : int
         Left it with w >= 0, scattered back through its upper plane.
     below_minimum : int
@@ -57,6 +60,7 @@ class Transported:
     started: int
     screened: int
     stopped: int
+    sideways: int
     upward: int
     below_minimum: int
 
@@ -78,12 +82,15 @@ def transport(
     seed: int,
     processes: int | None = None,
     material: str = "G4_WATER",
+    density: float | None = None,
+    box: tuple[float, float] | None = None,
     progress: bool = True,
 ) -> Transported:
-    """Carry a sample through a laterally infinite slab by Geant4.
+    """Carry a sample through a slab by Geant4.
 
     The same sample and seed give the same survivors, whatever the number of processes. The physics is in
-    `deepmuon_training.geant4_slab`.
+    `deepmuon_training.geant4_slab`. The slab is infinite, unless `box` limits it: then the muons start at places
+    uniform over its upper face, wherever they were before, and those that leave it by its sides are lost.
 
     Parameters
     ----------
@@ -96,7 +103,11 @@ def transport(
     processes : int, optional
         Geant4 processes to run side by side; by default one per core.
     material : str
-        Geant4's (NIST) name of the slab's material.
+        What the slab is made of: Geant4's (NIST) name, or standard_rock (Z = 11, A = 22, 2.65 g/cm3).
+    density : float, optional
+        Its density in g/cm3, if not the material's own.
+    box : (float, float), optional
+        Widths of the slab along x and y in m.
     progress : bool
         Whether to draw a progress bar on stderr.
 
@@ -113,11 +124,14 @@ def transport(
         If a Geant4 process ends without its result.
     """
     processes = os.cpu_count() or 1 if processes is None else processes
-    _check_arguments(sample, thickness, seed, processes, material)
+    overburden = medium(material, density)
+    _check_arguments(sample, thickness, seed, processes, overburden)
+    _check_box(box)
+    check_material(material, density)
     muons = sample.muons
-    carried = np.flatnonzero(muons.kinetic_energy * muons.cos_zenith >= _needed_energy(thickness, material))
-    job = SlabJob(material, float(thickness), int(seed))
-    exits = run_geant4(_primaries(muons[carried]), job, processes, progress)
+    carried = np.flatnonzero(muons.kinetic_energy * muons.cos_zenith >= _needed_energy(thickness, overburden))
+    job = SlabJob(material, float(thickness), int(seed), density, box)
+    exits, sideways = run_geant4(_primaries(muons[carried]), job, processes, progress)
     upward = exits["w"] >= 0
     below_minimum = ~upward & (exits["energy"] < np.float32(MINIMUM_ENERGY))
     survivors = exits[~upward & ~below_minimum]
@@ -126,18 +140,19 @@ def transport(
     started = len(muons)
     return Transported(
         sample=replace(
-            below_slab(sample, started, len(crossed), thickness, material, f"seed {seed}"),
+            below_slab(sample, started, len(crossed), thickness, overburden, _how(seed, box)),
             muons=crossed,
         ),
         started=started,
         screened=started - len(carried),
-        stopped=len(carried) - len(exits),
+        stopped=len(carried) - len(exits) - sideways,
+        sideways=sideways,
         upward=int(np.sum(upward)),
         below_minimum=int(np.sum(below_minimum)),
     )
 
 
-def below_slab(sample: Sample, started: int, survived: int, thickness: float, material: str, how: str) -> Sample:
+def below_slab(sample: Sample, started: int, survived: int, thickness: float, overburden: str, how: str) -> Sample:
     """Return a sample, muons aside, at the lower plane of a slab: its depth, medium, rate and provenance.
 
     Parameters
@@ -148,26 +163,30 @@ def below_slab(sample: Sample, started: int, survived: int, thickness: float, ma
         Muons that were asked for, and those that crossed the lower plane.
     thickness : float
         Of the slab in m.
-    material : str
-        Geant4's (NIST) name of what it is made of.
+    overburden : str
+        What it is made of, as `deepmuon_training.material.medium` says it.
     how : str
         How they were carried, for the provenance.
     """
     fraction, error = survived / started, _binomial_error(survived, started)
     return sample.then(
-        f"carried through {thickness:g} m of {material} by geant4_pybind {version('geant4_pybind')}, "
+        f"carried through {thickness:g} m of {overburden} by geant4_pybind {version('geant4_pybind')}, "
         f"{how}: {survived} of {started} survived",
         depth_m=sample.depth_m + thickness,
-        medium=material,
+        medium=overburden,
         rate=None if sample.rate is None else sample.rate * fraction,
         rate_uncertainty=_rate_uncertainty(sample, fraction, error),
     )
 
 
-def _needed_energy(thickness: float, material: str) -> float:
+def _needed_energy(thickness: float, overburden: str) -> float:
     """Return the least E |w| [GeV] with which it is worth to try; 0 where that is not known."""
-    known = material == "G4_WATER" and thickness >= _THINNEST_SCREENED
+    known = overburden == "G4_WATER" and thickness >= _THINNEST_SCREENED
     return _LEAST_LOSS * thickness if known else 0.0
+
+
+def _how(seed: int, box: tuple[float, float] | None) -> str:
+    return f"seed {seed}" if box is None else f"{box[0]:g} m x {box[1]:g} m wide, seed {seed}"
 
 
 def _binomial_error(survived: int, started: int) -> float:
@@ -182,18 +201,23 @@ def _rate_uncertainty(sample: Sample, fraction: float, error: float) -> float | 
     return math.hypot(sample.rate_uncertainty * fraction, sample.rate * error)
 
 
-def _check_arguments(sample: Sample, thickness: float, seed: int, processes: int, material: str) -> None:
+def _check_arguments(sample: Sample, thickness: float, seed: int, processes: int, overburden: str) -> None:
     if not (math.isfinite(thickness) and thickness > 0):
         raise RefusedError(f"a slab {thickness} m thick: its thickness must be a positive number of metres")
     if seed < 0:
         raise RefusedError(f"seed {seed} is negative: it must be 0 or more")
     if processes < 1:
         raise RefusedError(f"{processes} processes can't carry muons: at least 1 is needed")
-    if sample.depth_m > 0 and sample.medium != material:
-        raise RefusedError(f"muons under {sample.depth_m:g} m of {sample.medium} can't go on in {material}")
+    if sample.depth_m > 0 and sample.medium != overburden:
+        raise RefusedError(f"muons under {sample.depth_m:g} m of {sample.medium} can't go on in {overburden}")
     if len(sample) == 0:
         raise RefusedError("the sample holds no muons: there is nothing to carry")
     _check_muons(sample.muons)
+
+
+def _check_box(box: tuple[float, float] | None) -> None:
+    if box is not None and not all(0 < width < math.inf for width in box):
+        raise RefusedError(f"a box of {box[0]} m x {box[1]} m: both widths must be positive numbers of metres")
 
 
 def _check_muons(muons: Muons) -> None:
