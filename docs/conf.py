@@ -1,4 +1,4 @@
-"""How Sphinx builds the site: ``sphinx-build -W docs docs/_build``. Nothing is downloaded, then or while reading."""
+"""How Sphinx builds the site; ``python docs/make_site.py`` runs it. Nothing is downloaded while reading."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ release = version = version_of("deepmuon-runtime")
 
 extensions = [
     "include_all",
+    "live_page",
     "mathml",
     "myst_parser",
     "released_models",
@@ -39,6 +40,7 @@ autodoc_default_options = {"members": True}
 napoleon_google_docstring = False
 
 html_theme = "furo"
+html_favicon = "images/favicon.svg"
 html_title = f"DeepMuon {version}"
 html_math_renderer = "mathml"
 html_copy_source = False

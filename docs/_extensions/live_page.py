@@ -1,0 +1,97 @@
+"""The live page: puts its scripts, its engine and the released models beside docs/live/index.md when the site is built.
+
+The engine comes from npm: `python docs/make_site.py` gets it. Without it the page is there and says that it is
+missing, and Sphinx warns.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+from pathlib import Path
+
+from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
+from sphinx.util import logging
+from sphinx.util.typing import ExtensionMetadata
+
+from deepmuon_runtime import Model, list_models
+from deepmuon_runtime.released import default_architecture, read_released
+
+__all__ = ["setup"]
+
+PAGE = "live"
+LINKED_FILE = re.compile(r'(?:href|src)="(\.\./_static/[^"#]+)"')
+MODEL_FIELDS = (
+    "name",
+    "sha256",
+    "architecture",
+    "depth_m",
+    "muons_per_draw",
+    "latent_size",
+    "energy_min_gev",
+    "energy_max_gev",
+    "rate_hz_per_m2",
+)
+
+
+def build_live_page(app: Sphinx, exception: Exception | None) -> None:
+    """Put together what the page needs."""
+    if exception is not None or app.builder.format != "html":
+        return
+    source, target = Path(app.srcdir, PAGE), Path(app.outdir, PAGE)
+    for script in [*source.glob("*.js"), *source.glob("*.css")]:
+        shutil.copy(script, target)
+    if (source / "engine").exists():
+        shutil.copytree(source / "engine", target / "engine", dirs_exist_ok=True)
+    else:
+        logging.getLogger(__name__).warning(
+            "the live page has no engine, which npm brings: build the site with python docs/make_site.py"
+        )
+    write_models(Path(app.srcdir, "evaluations"), target)
+    write_kept_files(target)
+
+
+def write_models(evaluations: Path, target: Path) -> None:
+    """Write the released models, and models.json, which describes them."""
+    folder = target / "models"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    models = list_models()
+    for model in models:
+        (folder / model.name).write_bytes(read_released(model))
+    released = {
+        "default_architecture": default_architecture(),
+        "models": [describe(model, evaluations) for model in models],
+    }
+    (target / "models.json").write_text(json.dumps(released), encoding="utf-8")
+
+
+def describe(model: Model, evaluations: Path) -> dict[str, object]:
+    """Return what the page needs to know of a model: docs/live/models.js has it in words."""
+    evaluation = evaluations / f"{Path(model.name).stem}.json"
+    if model.rate_hz_per_m2 is None or not evaluation.exists():
+        raise ExtensionError(f"the live page needs the rate of {model.name}, and {evaluation}")
+    spectra = json.loads(evaluation.read_text(encoding="utf-8"))["held_out_spectra"]
+    by_energy = [sum(counts) for counts in zip(spectra["plus_by_energy"], spectra["minus_by_energy"], strict=True)]
+    held_out = {"by_energy": by_energy, "by_cos_zenith": spectra["by_cos_zenith"]}
+    return {field: getattr(model, field) for field in MODEL_FIELDS} | {"held_out": held_out}
+
+
+def write_kept_files(target: Path) -> None:
+    """Write kept_files.js: what the service worker keeps for use without a network, and a version of all of it."""
+    here = [file for file in target.rglob("*") if file.is_file() and file.name != "kept_files.js"]
+    linked = LINKED_FILE.findall((target / "index.html").read_text(encoding="utf-8"))
+    files = sorted([file.relative_to(target).as_posix() for file in here] + linked)
+    contents = (target.joinpath(file.partition("?")[0]).read_bytes() for file in files)
+    version = hashlib.sha256(b"".join(hashlib.sha256(content).digest() for content in contents)).hexdigest()
+    kept = json.dumps({"version": version, "files": files}, indent=4)
+    (target / "kept_files.js").write_text(f"self.KEPT = {kept};\n", encoding="utf-8")
+
+
+def setup(app: Sphinx) -> ExtensionMetadata:
+    """Build the page after Sphinx has written it."""
+    app.connect("build-finished", build_live_page)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

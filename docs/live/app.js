@@ -1,0 +1,156 @@
+/** The live page: makes the muons that the reader chooses, shows them and saves them. */
+
+import { Choices } from "./choices.js";
+import { Engine } from "./engine.js";
+import { fetchReleased, place } from "./models.js";
+import { workOffline } from "./offline.js";
+import { element } from "./page.js";
+import { Results } from "./results.js";
+import { count, duration, rounded } from "./words.js";
+
+/** @typedef {import("./models.js").Model} Model */
+
+const form = element("form", HTMLFormElement);
+const fields = element("choices", HTMLFieldSetElement);
+const generateButton = element("generate", HTMLButtonElement);
+const stopButton = element("stop", HTMLButtonElement);
+const saveButton = element("save", HTMLButtonElement);
+const bar = element("progress", HTMLProgressElement);
+const status = element("status", HTMLElement);
+const problem = element("error", HTMLElement);
+
+class App {
+    /** @param {import("./models.js").Released} released */
+    constructor(released) {
+        this.results = new Results();
+        this.choices = new Choices(released, () => this.pick());
+        this.engine = new Engine();
+        this.stopped = false;
+        this.blocks = 0; // that the worker keeps
+        this.fileName = "";
+        form.onsubmit = (event) => {
+            event.preventDefault();
+            this.generate();
+        };
+        stopButton.onclick = () => {
+            this.stopped = true;
+        };
+        saveButton.onclick = () => this.save();
+        generateButton.disabled = false;
+        this.pick();
+        status.textContent = "Ready.";
+    }
+
+    /** Another model is picked, and there are no muons of it. */
+    pick() {
+        this.blocks = 0;
+        saveButton.disabled = true;
+        status.textContent = "";
+        this.results.begin(this.choices.model, this.choices.surface);
+    }
+
+    generate() {
+        const wanted = this.choices.read();
+        if (!wanted) return;
+        const { model, number, seed } = wanted;
+        const { surface } = this.choices;
+        this.pick();
+        this.work(async () => {
+            status.textContent = `Getting the ${model.architecture} model ready …`;
+            await this.engine.ask("open", model);
+            await this.engine.ask("start", number, seed);
+            status.textContent = `Making ${count(number)} muons ${place(model.depth_m)} …`;
+            const begun = performance.now();
+            let [made, seconds] = [0, 0];
+            let coming = this.engine.ask("more");
+            while (made < number && !this.stopped) {
+                const progress = await coming;
+                made = progress.tally.count;
+                seconds = (performance.now() - begun) / 1000;
+                if (made < number && !this.stopped) coming = this.engine.ask("more"); // while this draws
+                bar.value = made / number;
+                this.blocks = progress.blocks;
+                this.results.show(progress, model, surface, seconds);
+            }
+            this.fileName = `muons-${model.architecture}-${model.depth_m}m-seed-${seed}.csv`;
+            this.results.showCommand(model, made, seed);
+            const wait = duration(made / model.rate_hz_per_m2);
+            status.textContent =
+                `${this.stopped ? "Stopped: " : ""}${count(made)} muons in ${duration(seconds)}, ` +
+                `${rounded(made / seconds)} a second. A detector of 1 m² waits ${wait} for them.`;
+        });
+    }
+
+    save() {
+        this.work(async () => {
+            status.textContent = "Writing the file …";
+            const parts = [];
+            while (parts.length < this.blocks && !this.stopped) {
+                parts.push(await this.engine.ask("csv", parts.length));
+                bar.value = parts.length / this.blocks;
+            }
+            if (this.stopped) {
+                status.textContent = "Stopped: no file was saved.";
+                return;
+            }
+            download(new Blob(parts, { type: "text/csv" }), this.fileName);
+            status.textContent = `Saved as ${this.fileName}.`;
+        });
+    }
+
+    /**
+     * Do something that takes a while, which the reader may stop, and say so if it fails.
+     *
+     * @param {() => Promise<void>} task
+     */
+    async work(task) {
+        this.stopped = false;
+        problem.textContent = "";
+        bar.value = 0;
+        this.setBusy(true);
+        try {
+            await task();
+        } catch (error) {
+            this.fail(error);
+        }
+        this.setBusy(false);
+    }
+
+    /** @param {boolean} busy */
+    setBusy(busy) {
+        const hadFocus = form.contains(document.activeElement);
+        fields.disabled = generateButton.disabled = busy;
+        saveButton.disabled = busy || this.blocks === 0;
+        stopButton.disabled = bar.hidden = !busy;
+        if (hadFocus) (busy ? stopButton : generateButton).focus();
+    }
+
+    /** @param {unknown} error */
+    fail(error) {
+        status.textContent = "";
+        problem.textContent = error instanceof Error ? error.message : String(error);
+        this.blocks = 0;
+        this.engine.close(); // what failed may be broken
+        this.engine = new Engine();
+    }
+}
+
+/**
+ * @param {Blob} file
+ * @param {string} name
+ */
+function download(file, name) {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(file);
+    link.download = name;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 60_000); // the browser may ask first where to put it
+}
+
+try {
+    new App(await fetchReleased());
+    workOffline(element("offline", HTMLElement));
+} catch (error) {
+    status.textContent = "";
+    problem.textContent = error instanceof Error ? error.message : String(error);
+}

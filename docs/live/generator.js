@@ -1,0 +1,115 @@
+/** A model, ready to give muons. Runs in the worker. */
+
+import { fetchFile } from "./fetch_file.js";
+import { Latents } from "./latents.js";
+
+const ENGINE = new URL("engine/", import.meta.url);
+const MODELS = new URL("models/", import.meta.url);
+
+export class Generator {
+    /**
+     * @param {import("./models.js").Model} model
+     * @param {typeof import("onnxruntime-web")} ort
+     * @param {import("onnxruntime-web").InferenceSession} session
+     * @param {Latents} latents
+     */
+    constructor(model, ort, session, latents) {
+        this.model = model;
+        this.ort = ort;
+        this.session = session;
+        this.latents = latents;
+    }
+
+    /**
+     * @param {import("./models.js").Model} model
+     * @throws {Error} in words
+     */
+    static async open(model) {
+        const [ort, latents] = await Promise.all([openOnnxRuntime(), openLatents()]);
+        const bytes = await fetchBytes(new URL(model.name, MODELS), "The model");
+        await checkHash(bytes, model);
+        try {
+            const session = await ort.InferenceSession.create(bytes, { executionProviders: ["wasm"] });
+            return new Generator(model, ort, session, latents);
+        } catch (error) {
+            throw new Error(`The model ${model.name} could not be opened: ${reason(error)}`);
+        }
+    }
+
+    /**
+     * Muons `first` to `first + count - 1` of a seed, as `deepmuon-gen` makes them.
+     *
+     * @param {bigint} seed 0 to 2^64 - 1
+     * @param {number} first a multiple of `muonsInBlock()`
+     * @param {number} count
+     * @returns {Promise<import("./tally.js").Muons>}
+     * @throws {Error} in words, if the model fails
+     */
+    async sample(seed, first, count) {
+        const { name, latent_size, muons_per_draw } = this.model;
+        const draws = Math.ceil(count / muons_per_draw);
+        const latent = this.latents.draw(seed, first / muons_per_draw, draws, latent_size);
+        try {
+            const made = await this.session.run({
+                latent: new this.ort.Tensor("float32", latent, [draws, latent_size]),
+            });
+            return {
+                energy: /** @type {Float32Array} */ (made.kinetic_energy.data).subarray(0, count),
+                direction: /** @type {Float32Array} */ (made.direction.data).subarray(0, 3 * count),
+                charge: /** @type {Int8Array} */ (made.charge.data).subarray(0, count),
+            };
+        } catch (error) {
+            throw new Error(`The model ${name} failed: ${reason(error)}`);
+        }
+    }
+
+    /** Give its memory back. */
+    async close() {
+        await this.session.release();
+    }
+}
+
+/** @type {Promise<typeof import("onnxruntime-web")> | undefined} */
+let onnxRuntime;
+
+function openOnnxRuntime() {
+    onnxRuntime ??= (async () => {
+        const url = new URL("ort.wasm.bundle.min.mjs", ENGINE);
+        await fetchFile(url, "ONNX Runtime"); // says why, where an import would not
+        const ort = await import(url.href);
+        ort.env.wasm.numThreads = 1; // more would need headers that few sites send
+        ort.env.wasm.wasmBinary = await fetchBytes(new URL("ort-wasm-simd-threaded.wasm", ENGINE), "ONNX Runtime");
+        return ort;
+    })();
+    return onnxRuntime;
+}
+
+async function openLatents() {
+    return Latents.open(await fetchBytes(new URL("random.wasm", ENGINE), "The generator of random numbers"));
+}
+
+/**
+ * @param {URL} url
+ * @param {string} name
+ */
+async function fetchBytes(url, name) {
+    return (await fetchFile(url, name)).arrayBuffer();
+}
+
+/**
+ * @param {ArrayBuffer} bytes
+ * @param {import("./models.js").Model} model
+ */
+async function checkHash(bytes, model) {
+    if (!crypto.subtle) return; // only on https and localhost
+    const hash = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes));
+    const found = Array.from(hash, (byte) => byte.toString(16).padStart(2, "0")).join("");
+    if (found !== model.sha256) {
+        throw new Error(`The model ${model.name} is damaged, or newer than this page: load the page again.`);
+    }
+}
+
+/** @param {unknown} error */
+function reason(error) {
+    return (error instanceof Error ? error.message : String(error)).split("\n")[0];
+}

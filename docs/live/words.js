@@ -1,0 +1,66 @@
+/** Numbers in words. */
+
+const integer = new Intl.NumberFormat("en");
+const three = new Intl.NumberFormat("en", { maximumSignificantDigits: 3 });
+
+const DAY = 86400;
+
+/** @type {[string, number][]} */
+const UNITS = [
+    ["year", 365.25 * DAY],
+    ["day", DAY],
+    ["h", 3600],
+    ["min", 60],
+    ["s", 1],
+];
+
+/** @param {number} number of things */
+export function count(number) {
+    return integer.format(number);
+}
+
+/** @param {number} number to three digits */
+export function rounded(number) {
+    return number >= 1e6 ? `${three.format(number / 1e6)} million` : three.format(number);
+}
+
+/**
+ * A time in its two largest units: 2 h 30 min.
+ *
+ * @param {number} seconds
+ */
+export function duration(seconds) {
+    if (seconds < 60) return `${three.format(seconds)} s`;
+    const largest = UNITS.findIndex(([, size]) => seconds >= size);
+    const [[, size], [, finer]] = UNITS.slice(largest, largest + 2);
+    const whole = Math.floor((Math.round(seconds / finer) * finer) / size);
+    const rest = Math.round((seconds - whole * size) / finer);
+    return [units(whole, UNITS[largest]), rest > 0 && units(rest, UNITS[largest + 1])].filter(Boolean).join(" ");
+}
+
+/**
+ * @param {number} number
+ * @param {[string, number]} unit
+ */
+function units(number, [unit, size]) {
+    return `${count(number)} ${unit}${number > 1 && size >= DAY ? "s" : ""}`;
+}
+
+/**
+ * The number that a reader typed: 1000000, 1e6, 1,000,000 or 1_000_000.
+ *
+ * @param {string} text
+ * @param {number} largest
+ * @throws {RangeError} in words, if it is no number of muons
+ */
+export function readNumber(text, largest) {
+    const digits = text.replace(/[\s,_]/g, "");
+    const number = digits === "" ? Number.NaN : Number(digits);
+    if (!Number.isInteger(number) || number < 1) {
+        throw new RangeError("How many muons? A whole number, such as 1000000 or 1e6.");
+    }
+    if (number > largest) {
+        throw new RangeError(`This page keeps ${count(largest)} muons at most; deepmuon-gen writes any number.`);
+    }
+    return number;
+}

@@ -1,0 +1,399 @@
+/** The live page in Chromium, on the built site. `npm run test:browser`; site.js says where the site is. */
+
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { readFile } from "node:fs/promises";
+import { after, before, test } from "node:test";
+import { openBrowser, serveSite } from "./site.js";
+
+const PYTHON = process.env.PYTHON ?? "python";
+const PATIENCE = 120_000; // ms; a machine may be slow
+
+/** @typedef {import("playwright-core").Page} Page */
+
+/** @type {Awaited<ReturnType<typeof serveSite>>} */
+let site;
+/** @type {import("../../../docs/live/models.js").Released} */
+let released;
+
+before(async () => {
+    site = await serveSite();
+    released = await (await fetch(`${site.address}live/models.json`)).json();
+});
+
+after(() => site.close());
+
+/**
+ * A test of the page in a browser of its own: nothing may be asked of other machines, and nothing complain.
+ *
+ * @param {string} name
+ * @param {(page: Page) => Promise<void>} body
+ * @param {import("playwright-core").BrowserContextOptions & {complaints?: RegExp}} [options]
+ */
+function testPage(name, body, { complaints, ...options } = {}) {
+    test(name, { timeout: 5 * PATIENCE }, async () => {
+        const { context, close } = await openBrowser({ viewport: { width: 1280, height: 900 }, ...options });
+        /** @type {string[]} */
+        const troubles = [];
+        context.on("request", (request) => {
+            if (!/^(blob:)?http:\/\/localhost:/.test(request.url())) troubles.push(`asked for ${request.url()}`);
+        });
+        context.on("console", (message) => {
+            if (["error", "warning"].includes(message.type())) troubles.push(message.text());
+        });
+        context.on("weberror", (error) => troubles.push(error.error().message));
+        try {
+            const page = await context.newPage();
+            page.setDefaultTimeout(PATIENCE);
+            await open(page);
+            await body(page);
+            assert.deepEqual(
+                troubles.filter((text) => !complaints?.test(text)),
+                [],
+            );
+        } finally {
+            await close();
+        }
+    });
+}
+
+/** @param {Page} page */
+async function open(page) {
+    await page.goto(`${site.address}live/`);
+    await page.locator("#generate:enabled").waitFor();
+}
+
+/**
+ * @param {Page} page
+ * @param {{depth?: number, architecture?: string, number?: string, seed?: string}} wanted
+ */
+async function generate(page, { depth, architecture, number = "50000", seed = "" }) {
+    if (depth !== undefined) await page.getByLabel("Depth").selectOption(String(depth));
+    if (architecture !== undefined) await page.getByLabel("Architecture").selectOption(architecture);
+    await page.getByLabel("Muons", { exact: true }).fill(number);
+    await page.getByLabel("Seed").fill(seed);
+    await page.getByRole("button", { name: "Generate" }).click();
+}
+
+/** @param {Page} page */
+async function finished(page) {
+    await page.getByRole("status").getByText(" muons in ").waitFor();
+    await page.locator("#generate:enabled").waitFor();
+}
+
+/** @param {Page} page */
+async function saveCsv(page) {
+    const [file] = await Promise.all([
+        page.waitForEvent("download"),
+        page.getByRole("button", { name: "Save" }).click(),
+    ]);
+    const lines = (await readFile(await file.path(), "utf-8")).trimEnd().split("\n");
+    return {
+        name: file.suggestedFilename(),
+        header: lines[0],
+        muons: lines.slice(1).map((line) => line.split(",").map(Number)),
+    };
+}
+
+/**
+ * The same muons by the package, as rows of the CSV.
+ *
+ * @param {import("../../../docs/live/models.js").Model} model
+ * @param {number} number
+ * @param {number} seed
+ * @returns {number[][]}
+ */
+function muonsOfPackage({ depth_m, architecture }, number, seed) {
+    const program = `
+import json
+from deepmuon_runtime import Generator
+muons = Generator.open(${depth_m}, architecture="${architecture}").sample(${number}, seed=${seed})
+columns = (muons.kinetic_energy, muons.u, muons.v, muons.w, muons.pdg_id)
+print(json.dumps([column.tolist() for column in columns]))`;
+    /** @type {number[][]} */
+    const columns = JSON.parse(execFileSync(PYTHON, ["-c", program], { encoding: "utf-8", maxBuffer: 1e9 }));
+    return columns[0].map((_, i) => columns.map((column) => column[i]));
+}
+
+testPage("every released model gives the muons that the package makes of the same seed", async (page) => {
+    const number = 20_000;
+    for (const model of released.models) {
+        await generate(page, { depth: model.depth_m, architecture: model.architecture, number: "2e4", seed: "1" });
+        await finished(page);
+        const { name, header, muons } = await saveCsv(page);
+        assert.equal(name, `muons-${model.architecture}-${model.depth_m}m-seed-1.csv`);
+        assert.equal(header, "kinetic_energy,u,v,w,pdg_id");
+        assert.equal(muons.length, number);
+        let otherCharges = 0;
+        for (const [i, expected] of muonsOfPackage(model, number, 1).entries()) {
+            const relative = muons[i][0] / expected[0] - 1;
+            assert.ok(Math.abs(relative) < 1e-4, `${model.name}: energy ${i} is off by ${relative}`);
+            for (const axis of [1, 2, 3]) {
+                assert.ok(Math.abs(muons[i][axis] - expected[axis]) < 1e-5, `${model.name}: direction ${i}`);
+            }
+            otherCharges += muons[i][4] === expected[4] ? 0 : 1;
+        }
+        assert.ok(otherCharges <= 2, `${otherCharges} charges differ`); // rounding decides where chance is at its threshold
+        const mean = muons.reduce((sum, [energy]) => sum + energy, 0) / number;
+        assert.equal(await page.locator("#mean").textContent(), `${mean.toFixed(2)} GeV`);
+        assert.equal(await page.locator("#made").textContent(), "20,000");
+        assert.equal(await page.locator("#unphysical").textContent(), "0");
+    }
+});
+
+testPage("the energies fill the spectrum of muons kept out of the training", async (page) => {
+    const model = released.models[0];
+    await generate(page, { depth: model.depth_m, architecture: model.architecture, number: "2e5", seed: "3" });
+    await finished(page);
+    const { muons } = await saveCsv(page);
+    const total = model.held_out.by_energy.reduce((sum, count) => sum + count, 0);
+    const above10 = model.held_out.by_energy.slice(31).reduce((sum, count) => sum + count, 0) / total;
+    const found = muons.filter(([energy]) => energy >= 10).length / muons.length;
+    // Five standard errors, with a fixed seed.
+    assert.ok(Math.abs(found - above10) < 5 * Math.sqrt((above10 * (1 - above10)) / muons.length + 1 / total));
+});
+
+testPage("Stop ends a run early, and what was made can be saved", async (page) => {
+    await generate(page, { number: "10,000,000" });
+    await page.locator("#made").getByText(/\d/).waitFor();
+    await page.getByRole("button", { name: "Stop" }).click();
+    await finished(page);
+    const [, made] = /** @type {RegExpMatchArray} */ (
+        (await page.getByRole("status").innerText()).match(/^Stopped: ([\d,]+) muons/)
+    );
+    const number = Number(made.replaceAll(",", ""));
+    assert.ok(number > 0 && number < 1e7);
+    assert.equal((await saveCsv(page)).muons.length, number);
+});
+
+testPage("a run without a seed is a new one, and the command that is shown has its seed", async (page) => {
+    const runs = [];
+    for (let i = 0; i < 2; i++) {
+        await generate(page, { number: "1000" });
+        await finished(page);
+        runs.push({ command: await page.locator("#command").innerText(), ...(await saveCsv(page)) });
+    }
+    assert.notDeepEqual(runs[0].muons, runs[1].muons);
+    const [, seed] = /** @type {RegExpMatchArray} */ (runs[0].command.match(/ -n 1000 --seed (\d+) /));
+    await generate(page, { number: "1000", seed });
+    await finished(page);
+    assert.deepEqual((await saveCsv(page)).muons, runs[0].muons);
+});
+
+testPage("the keyboard is enough, and shows where it is", async (page) => {
+    const focused = () => page.evaluate(() => document.activeElement?.id ?? "");
+    /** @param {string} id */
+    const tabTo = async (id) => {
+        for (let i = 0; i < 60 && (await focused()) !== id; i++) await page.keyboard.press("Tab");
+        assert.equal(await focused(), id);
+        const outline = await page.evaluate(
+            () => getComputedStyle(/** @type {Element} */ (document.activeElement)).outlineWidth,
+        );
+        assert.equal(outline, "3px");
+    };
+    await tabTo("depth");
+    await page.keyboard.press("End");
+    await tabTo("architecture");
+    await tabTo("number");
+    await page.keyboard.press("Control+A");
+    await page.keyboard.type("20000");
+    await tabTo("seed");
+    await page.keyboard.type("5");
+    await page.keyboard.press("Enter");
+    await finished(page);
+    assert.equal(await focused(), "generate");
+    const deepest = Math.max(...released.models.map(({ depth_m }) => depth_m));
+    assert.match(await page.locator("#command").innerText(), new RegExp(`--depth ${deepest} .* -n 20000 --seed 5 `));
+    await tabTo("save");
+    const [file] = await Promise.all([page.waitForEvent("download"), page.keyboard.press("Enter")]);
+    assert.match(file.suggestedFilename(), /\.csv$/);
+    await tabTo("motion");
+    await page.keyboard.press("Space");
+    assert.equal(await page.locator("#motion").innerText(), "Play the sky");
+});
+
+testPage("a wrong number or seed is explained at its field, which gets the focus", async (page) => {
+    for (const [wrong, field, text] of [
+        [{ number: "many" }, "Muons", "How many muons?"],
+        [{ number: "1e9" }, "Muons", "10,000,000 muons at most"],
+        [{ seed: "-1" }, "Seed", "A seed is a whole number"],
+    ]) {
+        await generate(page, /** @type {object} */ (wrong));
+        const input = page.getByLabel(/** @type {string} */ (field), { exact: field === "Muons" });
+        assert.ok(await input.evaluate((element) => element === document.activeElement));
+        assert.equal(await input.getAttribute("aria-invalid"), "true");
+        const note = await page.locator(`#${await input.getAttribute("aria-describedby")}`).innerText();
+        assert.ok(note.includes(/** @type {string} */ (text)), note);
+        assert.equal(await page.locator("#made").innerText(), "–");
+    }
+});
+
+testPage(
+    "a telephone's width holds the page",
+    async (page) => {
+        await generate(page, {});
+        await finished(page);
+        const width = await page.evaluate(() => document.documentElement.scrollWidth);
+        assert.equal(width, 360);
+        for (const chart of ["#energy svg", "#zenith svg", "#sky"]) {
+            const box = /** @type {{x: number, width: number}} */ (await page.locator(chart).boundingBox());
+            assert.ok(box.x >= 0 && box.x + box.width <= 360 && box.width > 250, chart);
+        }
+    },
+    { viewport: { width: 360, height: 740 }, isMobile: true, hasTouch: true, deviceScaleFactor: 2 },
+);
+
+for (const colorScheme of /** @type {const} */ (["light", "dark"])) {
+    testPage(
+        `everything can be read in the ${colorScheme} theme`,
+        async (page) => {
+            await generate(page, {});
+            await finished(page);
+            await page.getByLabel("Seed").fill("-1");
+            const background = luminance(await style(page, "body", "background-color"));
+            assert.ok(colorScheme === "dark" ? background < 0.1 : background > 0.9);
+            for (const [selector, property, least] of /** @type {[string, string, number][]} */ ([
+                [".live [role=status]", "color", 4.5],
+                [".live #figures dt", "color", 4.5],
+                [".live #seed-note", "color", 4.5],
+                [".live .tick", "fill", 4.5],
+                [".live polyline.generated", "stroke", 3],
+                [".live .points", "fill", 3],
+            ])) {
+                const ratio = contrast(luminance(await style(page, selector, property)), background);
+                assert.ok(ratio >= least, `${selector}: ${ratio.toFixed(2)}`);
+            }
+        },
+        { colorScheme },
+    );
+}
+
+/**
+ * @param {Page} page
+ * @param {string} selector
+ * @param {string} property
+ */
+function style(page, selector, property) {
+    return page
+        .locator(selector)
+        .first()
+        .evaluate((element, name) => getComputedStyle(element).getPropertyValue(name), property);
+}
+
+/**
+ * Relative luminance, as the Web Content Accessibility Guidelines 2.2 define it.
+ *
+ * @param {string} colour "rgb(r, g, b)"
+ */
+function luminance(colour) {
+    const [red, green, blue] = /** @type {RegExpMatchArray} */ (colour.match(/[\d.]+/g)).map((part) => {
+        const share = Number(part) / 255;
+        return share <= 0.04045 ? share / 12.92 : ((share + 0.055) / 1.055) ** 2.4;
+    });
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue;
+}
+
+/**
+ * @param {number} one luminance
+ * @param {number} other
+ */
+function contrast(one, other) {
+    return (Math.max(one, other) + 0.05) / (Math.min(one, other) + 0.05);
+}
+
+testPage("the sky moves, and can be paused", async (page) => {
+    await generate(page, {});
+    await finished(page);
+    const [first, second] = await twoSkies(page);
+    assert.notEqual(first, second);
+    await page.getByRole("button", { name: "Pause the sky" }).click();
+    const [third, fourth] = await twoSkies(page);
+    assert.equal(third, fourth);
+});
+
+testPage(
+    "who asked for less motion sees a sky at rest",
+    async (page) => {
+        const [empty] = await twoSkies(page);
+        await generate(page, {});
+        await finished(page);
+        const [first, second] = await twoSkies(page);
+        assert.equal(first, second);
+        assert.notEqual(first, empty);
+        await page.getByRole("button", { name: "Play the sky" }).click();
+        await page.waitForFunction((still) => document.querySelector("canvas")?.toDataURL() !== still, first);
+    },
+    { reducedMotion: "reduce" },
+);
+
+/**
+ * The picture of the sky, and that after ten frames more.
+ *
+ * @param {Page} page
+ */
+function twoSkies(page) {
+    return page.evaluate(async () => {
+        const canvas = /** @type {HTMLCanvasElement} */ (document.querySelector("#sky"));
+        const first = canvas.toDataURL();
+        for (let i = 0; i < 10; i++) await new Promise(requestAnimationFrame);
+        return [first, canvas.toDataURL()];
+    });
+}
+
+test("once loaded, the page works without a network, every model too", { timeout: PATIENCE * 5 }, async () => {
+    const own = await serveSite();
+    const { context, close } = await openBrowser();
+    const page = await context.newPage();
+    page.setDefaultTimeout(PATIENCE);
+    try {
+        await page.goto(`${own.address}live/`);
+        await page.getByText("it works without a network").waitFor();
+        await own.close();
+        await context.setOffline(true);
+        await page.reload();
+        await page.locator("#generate:enabled").waitFor();
+        for (const { depth_m, architecture } of released.models) {
+            await generate(page, { depth: depth_m, architecture, number: "1000" });
+            await finished(page);
+            assert.equal(await page.locator("#made").innerText(), "1,000");
+        }
+        const rules = await page.evaluate(
+            () => [...document.styleSheets].filter((sheet) => sheet.cssRules.length > 0).length,
+        );
+        assert.ok(rules >= 3, "the theme's style sheets are kept too");
+    } finally {
+        await close();
+    }
+});
+
+for (const [file, what] of [
+    ["models/*.onnx", "The model"],
+    ["engine/ort-wasm-simd-threaded.wasm", "ONNX Runtime"],
+    ["engine/ort.wasm.bundle.min.mjs", "ONNX Runtime"],
+    ["engine/random.wasm", "The generator of random numbers"],
+]) {
+    testPage(
+        `a missing ${file} is told in words, and the page goes on when it is there again`,
+        async (page) => {
+            await page.context().route(`**/live/${file}`, (route) => route.fulfill({ status: 404 }));
+            await generate(page, {});
+            const alert = page.getByRole("alert").filter({ hasText: "could not be fetched: the site answers 404" });
+            assert.ok((await alert.innerText()).startsWith(what));
+            await page.context().unrouteAll();
+            await generate(page, {});
+            await finished(page);
+            assert.equal(await page.getByRole("alert").innerText(), "");
+        },
+        { serviceWorkers: "block", complaints: /404|blocked by Playwright/ },
+    );
+}
+
+testPage(
+    "a damaged model is told in words",
+    async (page) => {
+        await page.context().route("**/live/models/*.onnx", (route) => route.fulfill({ body: "no model" }));
+        await generate(page, {});
+        await page.getByRole("alert").filter({ hasText: "is damaged, or newer than this page" }).waitFor();
+    },
+    { serviceWorkers: "block", complaints: /blocked by Playwright/ },
+);

@@ -1,0 +1,32 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { count, duration, readNumber, rounded } from "../../docs/live/words.js";
+
+test("a time is told in its two largest units", () => {
+    assert.equal(duration(0.009), "0.009 s");
+    assert.equal(duration(12.34), "12.3 s");
+    assert.equal(duration(60), "1 min");
+    assert.equal(duration(9022), "2 h 30 min");
+    assert.equal(duration(3600 * 24), "1 day");
+    assert.equal(duration(3600 * 50), "2 days 2 h");
+    assert.equal(duration(86400 * 400), "1 year 35 days");
+});
+
+test("large numbers can be read", () => {
+    assert.equal(count(1234567), "1,234,567");
+    assert.equal(rounded(98765.4), "98,800");
+    assert.equal(rounded(1234567), "1.23 million");
+});
+
+test("a number of muons may be written in the ways of deepmuon-gen", () => {
+    for (const text of ["1000000", "1e6", "1,000,000", "1_000_000", " 1 000 000 "]) {
+        assert.equal(readNumber(text, 1e7), 1e6, text);
+    }
+});
+
+test("what is no number of muons is refused in words", () => {
+    for (const text of ["", "many", "0", "-5", "1.5", "1e400", "NaN"]) {
+        assert.throws(() => readNumber(text, 1e7), /How many muons/, text);
+    }
+    assert.throws(() => readNumber("1e8", 1e7), /10,000,000 muons at most/);
+});
