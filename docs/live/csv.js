@@ -1,6 +1,6 @@
-/** Muons as text: a line each, with the columns of the HDF5 file. */
+/** Muons as text, a line each: the columns of `deepmuon-csv`. */
 
-export const CSV_HEADER = "kinetic_energy,u,v,w,pdg_id\n";
+export const CSV_HEADER = "kinetic_energy_GeV,u,v,w,pdg_id\n";
 
 const MU_MINUS = 13; // and mu+ is -13
 

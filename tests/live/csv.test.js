@@ -2,13 +2,13 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { CSV_HEADER, csvLines } from "../../docs/live/csv.js";
 
-test("each muon is a line with the columns of the HDF5 file", () => {
+test("each muon is a line with the columns of deepmuon-csv", () => {
     const text = csvLines({
         energy: Float32Array.of(1.5, 1000),
         direction: Float32Array.of(0, 0.6, -0.8, 0, 0, -1),
         charge: Int8Array.of(-1, 1),
     });
-    assert.equal(CSV_HEADER, "kinetic_energy,u,v,w,pdg_id\n");
+    assert.equal(CSV_HEADER, "kinetic_energy_GeV,u,v,w,pdg_id\n");
     assert.equal(text, "1.5,0,0.600000024,-0.800000012,13\n1000,0,0,-1,-13\n");
 });
 

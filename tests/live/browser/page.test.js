@@ -122,7 +122,7 @@ testPage("every released model gives the muons that the package makes of the sam
         await finished(page);
         const { name, header, muons } = await saveCsv(page);
         assert.equal(name, `muons-${model.architecture}-${model.depth_m}m-seed-1.csv`);
-        assert.equal(header, "kinetic_energy,u,v,w,pdg_id");
+        assert.equal(header, "kinetic_energy_GeV,u,v,w,pdg_id");
         assert.equal(muons.length, number);
         let otherCharges = 0;
         for (const [i, expected] of muonsOfPackage(model, number, 1).entries()) {
