@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -46,7 +45,7 @@ def transport_file(
     muons_per_part
         Muons carried between two savings; with the seed it decides what becomes of each.
     folder
-        For the parts; made if need be, removed in the end.
+        An existing folder for the parts.
     progress
         Whether to draw a progress bar on stderr.
 
@@ -57,7 +56,6 @@ def transport_file(
     FailedError
         If Geant4 fails, or nothing survives.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     upper = read_sample(source, 0, 0)
     started = int(read_attributes(source)["count"])
     parts = []
@@ -66,20 +64,25 @@ def transport_file(
             number = min(muons_per_part, started - first)
             parts.append(folder / f"part-{index:05d}.h5")
             if not parts[-1].exists():
-                muons = read_muons(source, first, number)
-                part = replace(upper, muons=muons)
-                carried = transport(part, thickness, seed=_part_seed(seed, index), material=material, progress=False)
+                carried = transport(
+                    replace(upper, muons=read_muons(source, first, number)),
+                    thickness,
+                    seed=_part_seed(seed, index),
+                    material=material,
+                    progress=False,
+                )
                 write_sample(parts[-1], carried.sample)
             bar.update(number)
     survived = sum(int(read_attributes(part)["count"]) for part in parts)
     if survived == 0:
-        raise FailedError(f"none of {started} muons survived {thickness:g} m of {material}: more or thinner layers?")
+        raise FailedError(
+            f"none of {started} muons survived {thickness:g} m of {material}: carry more, or take a thinner slab"
+        )
     how = f"seed {seed}, in parts of {muons_per_part}"
     lower = below_slab(upper, started, survived, thickness, material, how)
     with MuonWriter(target, lower.attributes) as writer:
         for part in parts:
             writer.append(read_muons(part))
-    shutil.rmtree(folder)
 
 
 def _part_seed(seed: int, index: int) -> int:
