@@ -24,7 +24,7 @@ NAME = "deepmuon-check"
 @click.version_option(package_name="deepmuon-runtime", prog_name=NAME, message="%(prog)s %(version)s")
 @click.pass_context
 def check(context: click.Context, file: Path) -> None:
-    """Check a muon file: its format, its attributes and each of its muons.
+    """Check a muon file: its format, its attributes, its checksums and each of its muons.
 
     \b
         deepmuon-check muons.h5

@@ -7,6 +7,7 @@ is that of its bytes one after the other, whatever the pieces in which they are 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import lru_cache
 
 __all__ = ["joined_crc32", "unlike"]
 
@@ -34,7 +35,7 @@ def joined_crc32(parts: Iterable[tuple[int, int]]) -> int:
     """
     joined = 0
     for checksum, length in parts:
-        joined = _product(joined, _power(ONE_BYTE, length)) ^ checksum
+        joined = _product(joined, _bytes(length)) ^ checksum
     return joined
 
 
@@ -52,11 +53,13 @@ def _product(a: int, b: int) -> int:
     return product
 
 
-def _power(base: int, exponent: int) -> int:
-    power = ONE
-    while exponent:
-        if exponent & 1:
+@lru_cache  # the parts of a file are of one or two lengths
+def _bytes(length: int) -> int:
+    """Return x^(8 length)."""
+    power, base = ONE, ONE_BYTE
+    while length:
+        if length & 1:
             power = _product(power, base)
         base = _product(base, base)
-        exponent >>= 1
+        length >>= 1
     return power

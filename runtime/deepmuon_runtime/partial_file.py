@@ -33,7 +33,8 @@ def hold(descriptor: int) -> None:
 def warn_of_leftovers(target: Path) -> None:
     """Warn of what killed writers of a file have left in its folder; those that are alive are passed over."""
     pattern = re.compile(re.escape(target.name) + r"\.[0-9a-f]{8}" + re.escape(PARTIAL_SUFFIX))
-    with os.scandir(target.parent) as entries:
+    names: list[str] = []
+    with suppress(OSError), os.scandir(target.parent) as entries:  # a folder that may be written but not read
         names = sorted(entry.name for entry in entries if pattern.fullmatch(entry.name) and _is_abandoned(entry.path))
     if names:
         others = f" and {len(names) - 1} more" if len(names) > 1 else ""
