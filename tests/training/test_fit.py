@@ -1,14 +1,18 @@
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 from torch import nn
 
 from deepmuon_runtime.errors import FailedError, RefusedError
+from deepmuon_training.checkpoint import fingerprint
 from deepmuon_training.fit import Schedule, fit
 
 SCHEDULE = Schedule(steps=60, learning_rate=0.05, weight_decay=0.01, averaging=0.9, validate_every=10)
@@ -114,8 +118,46 @@ def test_the_checkpoint_of_another_seed_is_refused(tmp_path: Path):
 def test_the_checkpoint_of_another_network_is_refused(tmp_path: Path):
     checkpoint = tmp_path / "fit.pt"
     fitted(network(), checkpoint=checkpoint)
-    with pytest.raises(RefusedError, match="is a checkpoint of a network of another size"):
+    with pytest.raises(RefusedError, match="is a checkpoint of the number of weights 17, not of 21"):
         fitted(network(hidden=5), checkpoint=checkpoint)
+
+
+def test_the_checkpoint_of_other_data_is_refused(tmp_path: Path):
+    checkpoint = tmp_path / "fit.pt"
+    x = np.arange(6, dtype=np.float32)
+    fitted(network(), checkpoint=checkpoint, data=fingerprint(x))
+    fitted(network(), checkpoint=checkpoint, data=fingerprint(x.copy()))
+    for other in (x + 1, x[:5], x.reshape(2, 3), x.astype(np.float64)):
+        with pytest.raises(RefusedError, match="is a checkpoint of other data: remove it"):
+            fitted(network(), checkpoint=checkpoint, data=fingerprint(other))
+
+
+def test_the_checkpoint_of_another_number_of_threads_is_refused(tmp_path: Path):
+    checkpoint = tmp_path / "fit.pt"
+    fitted(network(), checkpoint=checkpoint)
+    torch.set_num_threads(2)
+    try:
+        with pytest.raises(RefusedError, match="is a checkpoint of the number of threads 1, not of 2"):
+            fitted(network(), checkpoint=checkpoint)
+    finally:
+        torch.set_num_threads(1)
+
+
+@pytest.mark.parametrize("content", [b"", b"no checkpoint", b"PK"])
+def test_a_damaged_checkpoint_is_refused(tmp_path: Path, content: bytes):
+    checkpoint = tmp_path / "fit.pt"
+    checkpoint.write_bytes(content)
+    with pytest.raises(RefusedError, match="is no checkpoint of this version: remove it"):
+        fitted(network(), checkpoint=checkpoint)
+
+
+def test_a_slow_fit_is_also_saved_between_two_looks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(time, "monotonic", count(0, 20).__next__)  # each call is 20 seconds later
+    checkpoint = tmp_path / "fit.pt"
+    with pytest.raises(KilledError):
+        fitted(network(), loss=killed_after(7), checkpoint=checkpoint)
+    assert 0 < torch.load(checkpoint)["numbers"][0] <= 7
+    assert same(fitted(network(), checkpoint=checkpoint), fitted(network()))
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])

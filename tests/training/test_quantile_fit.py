@@ -103,7 +103,7 @@ def test_a_seed_gives_the_same_generator_again(few, undisturbed):
 
 
 def test_a_killed_training_goes_on_to_the_same_generator(few, undisturbed, tmp_path, monkeypatch):
-    checkpoint, calls = tmp_path / "charge.pt", iter(range(4))
+    calls = iter(range(4))
     cross_entropy = charge.binary_cross_entropy_with_logits
 
     def dying(*arguments):
@@ -114,9 +114,9 @@ def test_a_killed_training_goes_on_to_the_same_generator(few, undisturbed, tmp_p
     with monkeypatch.context() as patch:
         patch.setattr(charge, "binary_cross_entropy_with_logits", dying)
         with pytest.raises(KeyboardInterrupt):
-            fit_quantile(few, seed=1, schedules=TINY, checkpoint=checkpoint, progress=False)
-    assert checkpoint.exists()
-    resumed = fit_quantile(few, seed=1, schedules=TINY, checkpoint=checkpoint, progress=False)
+            fit_quantile(few, seed=1, schedules=TINY, checkpoint_folder=tmp_path, progress=False)
+    assert (tmp_path / "charge.pt").exists()
+    resumed = fit_quantile(few, seed=1, schedules=TINY, checkpoint_folder=tmp_path, progress=False)
     assert torch.equal(weights(resumed), weights(undisturbed))
     assert resumed.tails == undisturbed.tails
 

@@ -9,6 +9,7 @@ import torch
 from scipy.special import expit, logit
 from scipy.stats import kstest
 
+from deepmuon_runtime.errors import RefusedError
 from deepmuon_training import quantile_regression
 from deepmuon_training.monotone import ConditionalMonotoneMap, MonotoneMap
 from deepmuon_training.quantile_regression import RegressionSteps, regress, regress_conditional
@@ -48,12 +49,11 @@ def width(condition):
     return 1 + 0.5 * condition
 
 
-def trained(steps, **options) -> tuple[ConditionalMonotoneMap, float]:
+def trained(steps, seed=1, **options) -> tuple[ConditionalMonotoneMap, float]:
     torch.manual_seed(1)
     network = ConditionalMonotoneMap(units=33, reach=12.0, conditions=1, hidden=32)
-    loss = regress_conditional(
-        network, conditional_logistic(N, 1), conditional_logistic(N // 10, 2), steps, **{"progress": False, **options}
-    )
+    training, validation = conditional_logistic(N, seed), conditional_logistic(N // 10, 2)
+    loss = regress_conditional(network, training, validation, steps, **{"progress": False, **options})
     return network, loss
 
 
@@ -85,6 +85,35 @@ SHORT = RegressionSteps(adam=10, round=2, rounds=4)
 
 def test_the_regression_has_no_randomness_of_its_own():
     assert torch.equal(*(weights(trained(SHORT)[0]) for _ in range(2)))
+
+
+@pytest.mark.parametrize("rounds", [0, 1, 3])
+def test_a_regression_that_was_killed_goes_on_to_the_same_weights_bit_by_bit(tmp_path, monkeypatch, rounds):
+    judge, calls = quantile_regression._judge, iter(range(rounds))
+
+    def dying(*arguments):
+        if next(calls, None) is None:
+            raise KeyboardInterrupt
+        judge(*arguments)
+
+    checkpoint = tmp_path / "zenith.pt"
+    with monkeypatch.context() as patch:
+        patch.setattr(quantile_regression, "_judge", dying)
+        with pytest.raises(KeyboardInterrupt):
+            trained(SHORT, checkpoint=checkpoint)
+    assert checkpoint.exists() == (rounds > 0)
+    resumed, loss = trained(SHORT, checkpoint=checkpoint)
+    undisturbed, expected = trained(SHORT)
+    assert torch.equal(weights(resumed), weights(undisturbed))
+    assert loss == expected
+
+
+def test_the_checkpoint_of_another_regression_is_refused(tmp_path):
+    trained(SHORT, checkpoint=tmp_path / "zenith.pt")
+    with pytest.raises(RefusedError, match="is a checkpoint of the steps"):
+        trained(replace(SHORT, rounds=5), checkpoint=tmp_path / "zenith.pt")
+    with pytest.raises(RefusedError, match="is a checkpoint of other data"):
+        trained(SHORT, seed=3, checkpoint=tmp_path / "zenith.pt")
 
 
 def test_progress_changes_nothing(capfd):

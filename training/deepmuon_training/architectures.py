@@ -32,6 +32,10 @@ Settings = QuantileSchedules | TransformerSettings
 ARCHITECTURES: dict[str, type[Settings]] = {"quantile": QuantileSchedules, "transformer": TransformerSettings}
 """The settings of each architecture's fit, by its name."""
 
+_LEARNED_AZIMUTH = (
+    "The azimuth is learned, given energy and zenith: 16 harmonics of its logarithmic density, in steps of 2.8 degrees."
+)
+
 
 def fit_generator(
     sample: Sample,
@@ -104,12 +108,18 @@ def _fit_quantile(
 ) -> FittedGenerator:
     if azimuth == "uniform":
         check_uniform_azimuth(sample.muons)
-    checkpoint = folder and folder / "charge.pt"
-    networks = fit_quantile(sample.muons, seed=seed, schedules=settings, checkpoint=checkpoint, progress=progress)
-    return FittedGenerator(networks, Training.of(sample, seed), asdict(settings), _tail_notes(networks), None)
+    networks = fit_quantile(
+        sample.muons,
+        seed=seed,
+        schedules=settings,
+        learn_azimuth=azimuth == "learned",
+        checkpoint_folder=folder,
+        progress=progress,
+    )
+    return FittedGenerator(networks, Training.of(sample, seed), asdict(settings), _quantile_notes(networks), None)
 
 
-def _tail_notes(networks: QuantileGenerator) -> tuple[str, ...]:
+def _quantile_notes(networks: QuantileGenerator) -> tuple[str, ...]:
     tails, clip = networks.tails, networks.condition
     low, high = (float(energy) for energy in networks.transform.energy(np.array([clip.low, clip.high])))
     return (
@@ -118,6 +128,7 @@ def _tail_notes(networks: QuantileGenerator) -> tuple[str, ...]:
         f"goes as E^{tails.low_exponent:.2f}, down to 1 MeV.",
         f"Muons above {high:.0f} GeV share one distribution of angles and charges; so do those below {1000 * low:.1f} "
         "MeV.",
+        *(() if networks.azimuth is None else (_LEARNED_AZIMUTH,)),
     )
 
 
@@ -139,7 +150,7 @@ def _fit_transformer(
         charge=ChargeTable.of(charge, transform),
         energy_range=energy_range,
     )
-    raw = raw_muons(model.network, settings.calibration // 2, seed=seed + 1)
+    raw = raw_muons(model.network, settings.calibration // 2, seed=(seed + 1) % 2**64)
     energy, radius = box_cox(raw[:, 0] + transform.mean).numpy(), raw[:, 1:].norm(dim=1).numpy()
     outside = (energy < energy_range[0]) | (energy > energy_range[1])
     grazing = np.mean((radius < 1) & (radius > np.sqrt(1 - 0.2**2)))

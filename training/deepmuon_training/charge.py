@@ -11,6 +11,7 @@ from torch import nn
 from torch.nn.functional import binary_cross_entropy_with_logits
 
 from deepmuon_runtime.muons import Muons
+from deepmuon_training.checkpoint import fingerprint
 from deepmuon_training.condition import EnergyCondition
 from deepmuon_training.fit import Schedule, fit
 from deepmuon_training.monotone import perceptron
@@ -90,5 +91,15 @@ def fit_charge(
     def distance(network: nn.Module) -> float:
         return float(validation.entropy(network))
 
-    fit(network, loss, distance, schedule, seed=seed, name="charge", checkpoint=checkpoint, progress=progress)
+    fit(
+        network,
+        loss,
+        distance,
+        schedule,
+        seed=seed,
+        name="charge",
+        data=fingerprint(*columns),
+        checkpoint=checkpoint,
+        progress=progress,
+    )
     return network

@@ -58,7 +58,7 @@ def classify(generated: Muons, held_out: Muons, *, seed: int) -> ClassifierScore
         np.concatenate([_features(sample[part]) for sample in drawn]) for part in (slice(half), slice(half, 2 * half))
     )
     is_generated = np.repeat([True, False], half)
-    model = HistGradientBoostingClassifier(max_iter=100, early_stopping=False, random_state=seed)
+    model = HistGradientBoostingClassifier(max_iter=100, early_stopping=False, random_state=seed % 2**32)
     model.fit(trained, is_generated)
     auc = roc_auc_score(is_generated, model.decision_function(tested))
     return ClassifierScore(float(auc), sqrt((2 * half + 1) / (12 * half**2)), half, half)

@@ -30,6 +30,8 @@ COMPARED_MUONS = 100_000
 ROUNDING = 8.0
 """How much farther than PyTorch in float32 the ONNX output may be from PyTorch in float64."""
 
+_LAST_BIT = 2**-23
+
 LICENCE = "BSD-3-Clause"
 
 
@@ -143,7 +145,8 @@ def export(generator: Exportable, training: Training, path: Path, *, overwrite: 
 def compare(generator: Exportable, contents: bytes) -> Mismatch:
     """Compare an ONNX model with PyTorch's evaluation of the same stored numbers.
 
-    The yardstick is PyTorch itself, float32 against float64.
+    The yardstick is PyTorch itself, float32 against float64. Where a direction depends so much on the last bit of a
+    latent that this says little (an azimuth that few muons have), it is what a change of that bit makes, muon by muon.
 
     Raises
     ------
@@ -157,13 +160,15 @@ def compare(generator: Exportable, contents: bytes) -> Mismatch:
     with torch.no_grad():
         single = [part.numpy() for part in generator(torch.from_numpy(latent))]
         exact = [part.numpy() for part in generator(torch.from_numpy(latent).double())]
+        nudged = generator(torch.from_numpy(latent).double() * (1 - _LAST_BIT))[1].numpy()
     allowed, seen = _mismatch(single, exact), _mismatch(found, exact)
     limit = Mismatch(
-        ROUNDING * max(allowed.energy, 2**-23),
-        ROUNDING * max(allowed.direction, 2**-23),
+        ROUNDING * max(allowed.energy, _LAST_BIT),
+        ROUNDING * max(allowed.direction, _LAST_BIT),
         10 + 10 * allowed.charges,
     )
-    agree = seen.energy <= limit.energy and seen.direction <= limit.direction and seen.charges <= limit.charges
+    direction = float((np.abs(found[1] - exact[1]) - ROUNDING * np.abs(nudged - exact[1])).max())
+    agree = seen.energy <= limit.energy and direction <= limit.direction and seen.charges <= limit.charges
     if not agree:  # nor where one is no number
         raise FailedError(f"ONNX Runtime and PyTorch differ by {seen}, float32 rounding explains {limit}")
     return seen

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-import os
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -14,7 +13,8 @@ from torch import nn
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 from tqdm import tqdm
 
-from deepmuon_runtime.errors import FailedError, RefusedError
+from deepmuon_runtime.errors import FailedError
+from deepmuon_training.checkpoint import Checkpoint
 
 __all__ = ["Schedule", "fit"]
 
@@ -60,6 +60,7 @@ def fit(
     *,
     seed: int,
     name: str,
+    data: str = "",
     checkpoint: Path | None = None,
     progress: bool = True,
 ) -> float:
@@ -79,9 +80,11 @@ def fit(
         Seeds the generator of the batches. The initial weights are the caller's.
     name
         Shown by the progress bar.
+    data
+        Fingerprint of what the loss and the distance are made of, by which a checkpoint knows its own.
     checkpoint
-        File that holds the whole state at each look at the distance; where it exists, the fit goes on from
-        it and ends with the same weights as an undisturbed one on the same machine and number of threads.
+        File that holds the whole state at each look at the distance, and every half minute; where it exists, the fit
+        goes on from it and ends with the same weights as an undisturbed one on the same machine.
     progress
         Whether to show steps, loss, distance and the time left on stderr.
 
@@ -93,13 +96,14 @@ def fit(
     Raises
     ------
     RefusedError
-        If the checkpoint is of another schedule, seed or network.
+        If the checkpoint is of other data, schedule, seed, network or number of threads.
     FailedError
         If the loss or the distance is no finite number.
     """
     state = _State(network, schedule, seed)
-    if checkpoint is not None and checkpoint.exists():
-        state.load(checkpoint)
+    weights = sum(parameter.numel() for parameter in network.parameters())
+    kept = Checkpoint(checkpoint, data=data, seed=seed, schedule=asdict(schedule), **{"number of weights": weights})
+    state.load(kept)
     bar = tqdm(total=schedule.steps, initial=state.step, desc=name, disable=not progress, unit="step", mininterval=1)
     with bar:
         while state.step < schedule.steps and state.misses < schedule.patience:
@@ -108,8 +112,9 @@ def fit(
             if state.step % schedule.validate_every == 0 or state.step == schedule.steps:
                 state.look(distance)
                 bar.set_postfix(loss=f"{value:.4g}", distance=f"{state.last:.4g}", best=f"{state.best:.4g}")
-                if checkpoint is not None:
-                    state.save(checkpoint)
+                state.save(kept)
+            elif kept.is_due:
+                state.save(kept)
     network.load_state_dict(state.best_weights)
     return state.best
 
@@ -153,32 +158,22 @@ class _State:
         if not math.isfinite(value):
             raise FailedError(f"the {name} is {value} after {self.step} steps: training diverged, try a lower rate")
 
-    def save(self, path: Path) -> None:
-        parts = {
-            "schedule": asdict(self.schedule),
-            "network": self.network.state_dict(),
-            "average": self.average.state_dict(),
-            "optimizer": self.optimizer.state_dict(),
-            "random": self.random.get_state(),
-            "best_weights": self.best_weights,
-            "numbers": (self.step, self.misses, self.best, self.last),
-        }
-        temporary = path.with_name(path.name + ".part")
-        torch.save(parts, temporary)
-        os.replace(temporary, path)
+    def save(self, kept: Checkpoint) -> None:
+        kept.save(
+            network=self.network.state_dict(),
+            average=self.average.state_dict(),
+            optimizer=self.optimizer.state_dict(),
+            random=self.random.get_state(),
+            best_weights=self.best_weights,
+            numbers=(self.step, self.misses, self.best, self.last),
+        )
 
-    def load(self, path: Path) -> None:
-        parts = torch.load(path, weights_only=True, map_location="cpu")
-        if parts["schedule"] != asdict(self.schedule):
-            raise RefusedError(f"{path} is a checkpoint of the schedule {parts['schedule']}, not of {self.schedule}")
-        seed = self.random.initial_seed()
+    def load(self, kept: Checkpoint) -> None:
+        parts = kept.load()
+        if parts is None:
+            return
+        self.network.load_state_dict(parts["network"])
         self.random.set_state(parts["random"])
-        if self.random.initial_seed() != seed:
-            raise RefusedError(f"{path} is a checkpoint of the seed {self.random.initial_seed()}, not of {seed}")
-        try:
-            self.network.load_state_dict(parts["network"])
-        except RuntimeError as error:  # says over many lines which weights differ
-            raise RefusedError(f"{path} is a checkpoint of a network of another size") from error
         self.average.load_state_dict(parts["average"])
         self.optimizer.load_state_dict(parts["optimizer"])
         self.best_weights = parts["best_weights"]

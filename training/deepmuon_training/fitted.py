@@ -12,6 +12,7 @@ import torch
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muon_file import reason
+from deepmuon_training.azimuth_fit import AzimuthDensity
 from deepmuon_training.charge import ChargeProbability
 from deepmuon_training.condition import EnergyCondition
 from deepmuon_training.export import Exportable, Mismatch, Training, export
@@ -159,13 +160,15 @@ def _pack_quantile(networks: QuantileGenerator) -> dict[str, Any]:
         "mean": networks.transform.mean,
         "tails": to_json(networks.tails),
         "condition": to_json(networks.condition),
+        "learned_azimuth": networks.azimuth is not None,
         "weights": networks.state_dict(),
     }
 
 
 def _unpack_quantile(parts: dict[str, Any]) -> QuantileGenerator:
-    charge = ChargeProbability(from_json(EnergyCondition, parts["condition"]))
-    networks = QuantileGenerator(EnergyTransform(parts["mean"]), from_json(PowerLawTails, parts["tails"]), charge)
+    condition, tails = from_json(EnergyCondition, parts["condition"]), from_json(PowerLawTails, parts["tails"])
+    azimuth = AzimuthDensity(condition) if parts["learned_azimuth"] else None
+    networks = QuantileGenerator(EnergyTransform(parts["mean"]), tails, ChargeProbability(condition), azimuth)
     networks.load_state_dict(parts["weights"])
     return networks
 

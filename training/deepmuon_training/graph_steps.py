@@ -72,7 +72,10 @@ def interpolation_cells(g: Graph, table: NDArray[np.float32]) -> str:
 
 
 def bilinear_cells(g: Graph, *tables: NDArray[np.float32]) -> str:
-    """Return each cell's row of (value, along columns, along rows, mixed), for each table, [cells, 4 tables]."""
+    """Return each cell's row of (value, along columns, along rows, mixed), for each table, [cells, 4 tables].
+
+    Further dimensions of a table are indices of its cells.
+    """
     parts = []
     for table in tables:
         name = g.constant(table)
@@ -92,11 +95,19 @@ def on_plane(g: Graph, coefficients: list[str], a: str, b: str) -> str:
     return g("Add", upper, g("Mul", a, g("Add", along_rows, g("Mul", b, mixed))))
 
 
-def bilinear(table: torch.Tensor, i: torch.Tensor, a: torch.Tensor, j: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
-    """Evaluate in PyTorch what `bilinear_cells` and `on_plane` do, in row cell i at a and column cell j at b."""
-    upper = table[i, j] + b * (table[i, j + 1] - table[i, j])
-    lower = table[i + 1, j] + b * (table[i + 1, j + 1] - table[i + 1, j])
-    return upper + a * (lower - upper)
+def bilinear(
+    table: torch.Tensor, i: torch.Tensor, a: torch.Tensor, j: torch.Tensor, b: torch.Tensor, *k: torch.Tensor
+) -> torch.Tensor:
+    """Evaluate in PyTorch what `bilinear_cells` and `on_plane` do, in row cell i at a and column cell j at b.
+
+    A table of more dimensions is read at the further indices k.
+    """
+
+    def along_columns(i: torch.Tensor) -> torch.Tensor:
+        return table[(i, j, *k)] + b * (table[(i, j + 1, *k)] - table[(i, j, *k)])
+
+    upper = along_columns(i)
+    return upper + a * (along_columns(i + 1) - upper)
 
 
 def locate(value: torch.Tensor, scale: float) -> tuple[torch.Tensor, torch.Tensor]:

@@ -1,8 +1,8 @@
 """The `quantile` generator: a triangular transport map, one muon a draw.
 
-Energy from one latent, zenith from another given the energy, charge from a third given both, azimuth uniform: a
-Knothe-Rosenblatt map (G. Carlier, A. Galichon, F. Santambrogio, SIAM J. Math. Anal. 41 (2010) 2554), each step
-monotone in its latent and so the solution of a one-dimensional transport problem.
+Energy from one latent, zenith from another given the energy, charge from a third given both, azimuth from a fourth,
+uniform or given both: a Knothe-Rosenblatt map (G. Carlier, A. Galichon, F. Santambrogio, SIAM J. Math. Anal. 41 (2010)
+2554), each step monotone in its latent and so the solution of a one-dimensional transport problem.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import replace
 import torch
 from torch import nn
 
+from deepmuon_training.azimuth_fit import AzimuthDensity
 from deepmuon_training.charge import ChargeProbability
 from deepmuon_training.condition import EnergyCondition
 from deepmuon_training.monotone import ConditionalMonotoneMap, MonotoneMap
@@ -35,13 +36,21 @@ class QuantileGenerator(nn.Module):
         The power laws beyond what the energy network is trained on.
     charge
         The probability of mu+.
+    azimuth
+        Its density, or None where it is uniform.
     """
 
     architecture = "quantile"
 
-    def __init__(self, transform: EnergyTransform, tails: PowerLawTails, charge: ChargeProbability) -> None:
+    def __init__(
+        self,
+        transform: EnergyTransform,
+        tails: PowerLawTails,
+        charge: ChargeProbability,
+        azimuth: AzimuthDensity | None = None,
+    ) -> None:
         super().__init__()
-        self.transform, self.tails, self.charge = transform, tails, charge
+        self.transform, self.tails, self.charge, self.azimuth = transform, tails, charge, azimuth
         self.energy = MonotoneMap(units=97, reach=_LEVEL_REACH)
         self.zenith = ConditionalMonotoneMap(units=33, reach=_LEVEL_REACH, conditions=1, hidden=64)
 

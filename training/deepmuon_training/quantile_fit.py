@@ -10,6 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from deepmuon_runtime.muons import Muons
+from deepmuon_training.azimuth_fit import AZIMUTH_SCHEDULE, fit_azimuth
 from deepmuon_training.charge import CHARGE_SCHEDULE, fit_charge
 from deepmuon_training.fit import Schedule
 from deepmuon_training.power_law import PowerLawTails
@@ -35,10 +36,13 @@ class QuantileSchedules:
         Of the zenith map.
     charge
         Of the charge's probability.
+    azimuth
+        Of the azimuth's density, where it is learned.
     """
 
     zenith: RegressionSteps = RegressionSteps()
     charge: Schedule = CHARGE_SCHEDULE
+    azimuth: Schedule = AZIMUTH_SCHEDULE
 
 
 def fit_quantile(
@@ -46,7 +50,8 @@ def fit_quantile(
     *,
     seed: int,
     schedules: QuantileSchedules | None = None,
-    checkpoint: Path | None = None,
+    learn_azimuth: bool = False,
+    checkpoint_folder: Path | None = None,
     progress: bool = True,
 ) -> QuantileGenerator:
     """Train a generator on muons, the last twentieth of which validates.
@@ -59,25 +64,35 @@ def fit_quantile(
         Of weights and batches.
     schedules
         Steps and rates.
-    checkpoint
-        Of the charge's fit, as in `deepmuon_training.fit.fit`; the other steps take a minute or two and start anew.
+    learn_azimuth
+        Whether the azimuth's density is learned; else it is uniform.
+    checkpoint_folder
+        Existing folder for the checkpoints charge.pt, azimuth.pt and zenith.pt, see `deepmuon_training.fit.fit`.
     progress
         Whether to show progress bars.
     """
     schedules = schedules or QuantileSchedules()
     energy = muons.kinetic_energy.astype(np.float64)
     transform = EnergyTransform.fit(muons.kinetic_energy)
-    charge = fit_charge(
-        muons, transform, seed=seed, schedule=schedules.charge, checkpoint=checkpoint, progress=progress
+    charge_file, azimuth_file, zenith_file = (
+        checkpoint_folder and checkpoint_folder / f"{name}.pt" for name in ("charge", "azimuth", "zenith")
     )
+    charge = fit_charge(
+        muons, transform, seed=seed, schedule=schedules.charge, checkpoint=charge_file, progress=progress
+    )
+    azimuth = None
+    if learn_azimuth:
+        azimuth = fit_azimuth(
+            muons, transform, seed=seed, schedule=schedules.azimuth, checkpoint=azimuth_file, progress=progress
+        )
     tails = PowerLawTails.fit(energy, energy_min=MINIMUM_ENERGY, energy_max=ENERGY_MAX)
     torch.manual_seed(seed)
-    generator = QuantileGenerator(transform, tails, charge)
+    generator = QuantileGenerator(transform, tails, charge, azimuth)
     y = transform.pre_tanh(energy)
     regress(generator.energy, y, tails.level)
     condition = generator.condition(torch.from_numpy(y.astype(np.float32))).numpy()
     parts = split(condition, _cos_zenith_logit(muons))
-    regress_conditional(generator.zenith, *parts, schedules.zenith, progress=progress)
+    regress_conditional(generator.zenith, *parts, schedules.zenith, checkpoint=zenith_file, progress=progress)
     generator.join_tails()
     return generator
 

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -19,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.special import expit, logit
 from tqdm import tqdm
 
+from deepmuon_training.checkpoint import Checkpoint, fingerprint
 from deepmuon_training.monotone import ConditionalMonotoneMap, MonotoneMap
 from deepmuon_training.pinball import pinball_loss
 
@@ -74,6 +77,7 @@ def regress_conditional(
     validation: Sequence[NDArray[np.float32]],
     steps: RegressionSteps,
     *,
+    checkpoint: Path | None = None,
     progress: bool = True,
 ) -> float:
     """Fit a conditional map to the quantiles of values in some 180 bins of their condition.
@@ -91,6 +95,9 @@ def regress_conditional(
         Condition [n] and values [n].
     steps
         How long.
+    checkpoint
+        File that holds the whole state after each round; where it exists, the fit goes on from it and ends with the
+        same weights as an undisturbed one on the same machine.
     progress
         Whether to show rounds, validation loss and time left on stderr.
 
@@ -98,6 +105,11 @@ def regress_conditional(
     -------
     float
         The pinball loss that these weights have.
+
+    Raises
+    ------
+    RefusedError
+        If the checkpoint is of other data, steps or number of threads.
     """
     points, quantiles, weights = (torch.from_numpy(part) for part in _binned_quantiles(*training))
     points = points.unsqueeze(-1)
@@ -108,12 +120,6 @@ def regress_conditional(
         difference: torch.Tensor = network(levels, points) - quantiles
         return (weights * difference**2).mean()
 
-    adam = torch.optim.Adam(network.parameters(), lr=0.01)
-    fall = torch.optim.lr_scheduler.CosineAnnealingLR(adam, steps.adam)
-    for _ in tqdm(range(steps.adam), desc="zenith, Adam", disable=not progress, unit="step", mininterval=1):
-        _backward(adam, loss)
-        adam.step()
-        fall.step()
     lbfgs = torch.optim.LBFGS(
         network.parameters(),
         max_iter=steps.round,
@@ -122,24 +128,49 @@ def regress_conditional(
         tolerance_change=0,
         line_search_fn="strong_wolfe",
     )
-    best = kept = _validation_losses(network, *validation)
-    kept_weights, misses = copy.deepcopy(network.state_dict()), 0
-    with tqdm(range(steps.rounds), desc="zenith, L-BFGS", disable=not progress, unit="round") as bar:
-        for _ in bar:
+    initial = [parameter.detach().numpy() for parameter in network.parameters()]
+    kept = Checkpoint(checkpoint, data=fingerprint(*initial, *training, *validation), steps=asdict(steps))
+    state = kept.load()
+    if state is None:
+        _run_adam(network, loss, steps.adam, progress)
+        found = _validation_losses(network, *validation)
+        state = {"round": 0, "misses": 0, "best": found, "kept": found, "weights": copy.deepcopy(network.state_dict())}
+    else:
+        network.load_state_dict(state.pop("network"))
+        lbfgs.load_state_dict(state.pop("lbfgs"))
+    with tqdm(
+        total=steps.rounds, initial=state["round"], desc="zenith, L-BFGS", disable=not progress, unit="round"
+    ) as bar:
+        while state["round"] < steps.rounds and state["misses"] < steps.patience:
             lbfgs.step(lambda: _backward(lbfgs, loss))  # type: ignore[no-untyped-call]
             found = _validation_losses(network, *validation)
-            excess = found - best
-            if excess.mean() > _SIGNIFICANT * excess.std() / np.sqrt(len(excess)):
-                misses += 1
-            else:
-                kept, kept_weights, misses = found, copy.deepcopy(network.state_dict()), 0
-            best = min(best, found, key=torch.mean)
-            bar.set_postfix(pinball=f"{found.mean():.7g}", best=f"{best.mean():.7g}", refresh=False)
-            if misses == steps.patience:
-                break
-    network.load_state_dict(kept_weights)
+            _judge(state, found, network)
+            kept.save(network=network.state_dict(), lbfgs=lbfgs.state_dict(), **state)
+            bar.set_postfix(pinball=f"{found.mean():.7g}", best=f"{state['best'].mean():.7g}", refresh=False)
+            bar.update()
+    network.load_state_dict(state["weights"])
     network.float()
-    return float(kept.mean())
+    return float(state["kept"].mean())
+
+
+def _run_adam(network: ConditionalMonotoneMap, loss: Callable[[], torch.Tensor], steps: int, progress: bool) -> None:
+    adam = torch.optim.Adam(network.parameters(), lr=0.01)
+    fall = torch.optim.lr_scheduler.CosineAnnealingLR(adam, steps)
+    for _ in tqdm(range(steps), desc="zenith, Adam", disable=not progress, unit="step", mininterval=1):
+        _backward(adam, loss)
+        adam.step()
+        fall.step()
+
+
+def _judge(state: dict[str, Any], found: torch.Tensor, network: ConditionalMonotoneMap) -> None:
+    """Keep the weights unless their losses [n] are significantly above the best ones."""
+    excess = found - state["best"]
+    if excess.mean() > _SIGNIFICANT * excess.std() / np.sqrt(len(excess)):
+        state["misses"] += 1
+    else:
+        state.update(kept=found, weights=copy.deepcopy(network.state_dict()), misses=0)
+    state["best"] = min(state["best"], found, key=torch.mean)
+    state["round"] += 1
 
 
 def _validation_losses(

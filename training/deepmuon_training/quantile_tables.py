@@ -9,7 +9,7 @@ The five latents of a muon, uniform in (-1, 1):
 2
     Zenith. The table lies evenly in t and in the logit of the level (1 + l2) / 2, and holds logit cos zenith.
 3
-    Azimuth, pi l3.
+    Azimuth, pi l3; or where it is learned, see `azimuth_table`.
 4
     Charge: +1 where l4 < 2 P(mu+) - 1; P is tabulated beside the zenith.
 """
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from onnx import TensorProto
 
 from deepmuon_runtime.errors import FailedError
+from deepmuon_training.azimuth_table import LEVEL_KNOTS, TAIL_KNOTS, azimuth_turn, azimuth_turn_graph
 from deepmuon_training.graph import Graph
 from deepmuon_training.graph_steps import (
     LARGEST_LATENT,
@@ -74,6 +75,8 @@ class QuantileTables:
         Lowest and highest kinetic energy [GeV].
     energy_mean : float
         Mean of x that the networks were trained with; for the record.
+    azimuth : [41, 33, 129] or None
+        As in `azimuth_table`; None where it is uniform.
     """
 
     energy: Float32
@@ -81,6 +84,7 @@ class QuantileTables:
     charge: Float32
     energy_range: tuple[float, float]
     energy_mean: float
+    azimuth: Float32 | None = None
 
     architecture = "quantile"
     latent_size = LATENT_SIZE
@@ -95,7 +99,8 @@ class QuantileTables:
         x = linear(torch.from_numpy(self.energy), cell + _ENERGY_KNOTS, inside)
         row, a = locate(t.clamp(-_ROW_LIMIT, _ROW_LIMIT), _ROWS / _ROW_REACH)
         tail = 1 - l2.abs()
-        column, b = locate(torch.sign(l2) * torch.log((2 - tail) / tail), _COLUMNS / _COLUMN_REACH)
+        level = torch.sign(l2) * torch.log((2 - tail) / tail)
+        column, b = locate(level, _COLUMNS / _COLUMN_REACH)
         logit, threshold = (
             bilinear(torch.from_numpy(table), row + _ROWS, a, column + _COLUMNS, b)
             for table in (self.zenith, self.charge)
@@ -103,7 +108,8 @@ class QuantileTables:
         odds = torch.exp(-logit)
         cos_zenith = 1 / (1 + odds)
         sine = torch.sqrt(odds * cos_zenith * (1 + cos_zenith))
-        azimuth = torch.pi * l3
+        turn = l3 if self.azimuth is None else azimuth_turn(torch.from_numpy(self.azimuth), t, level, l3)
+        azimuth = torch.pi * turn
         direction = torch.stack([sine * torch.cos(azimuth), sine * torch.sin(azimuth), -cos_zenith], dim=1)
         charge = torch.where(l4 < threshold, 1, -1).to(torch.int8)
         return box_cox(x).clamp(*self.energy_range), direction, charge
@@ -127,7 +133,8 @@ class QuantileTables:
         cell = g("Cast", g("Add", g("Mul", row, float(width)), g("Add", column, offset)), to=TensorProto.INT32)
         coefficients = columns(g, g("Gather", bilinear_cells(g, self.zenith, self.charge), cell), 8)
         logit, threshold = (on_plane(g, coefficients[k : k + 4], a, b) for k in (0, 4))
-        direction = _direction(g, logit, l3)
+        turn = l3 if self.azimuth is None else azimuth_turn_graph(g, self.azimuth, t, logit_level, l3)
+        direction = _direction(g, logit, turn)
         return g, energy, direction, charge_sign(g, l4, threshold)
 
 
@@ -152,6 +159,7 @@ def tabulate(generator: QuantileGenerator) -> QuantileTables:
         zenith = generator.cos_zenith_logit(columns.expand(len(rows), -1), y)
         positive = generator.charge(y.repeat_interleave(len(columns)), torch.sigmoid(zenith).flatten())
         charge = torch.tanh(positive / 2).reshape(zenith.shape)
+        azimuth = _azimuth(generator)
     for name, values in (("energy", energy), ("zenith", zenith)):
         if not (values.diff(dim=-1) >= 0).all():  # nor where one is no number
             raise FailedError(f"the {name} map decreases somewhere: its latent must raise it everywhere")
@@ -161,7 +169,18 @@ def tabulate(generator: QuantileGenerator) -> QuantileTables:
         charge=charge.float().numpy(),
         energy_range=(generator.tails.energy_min, generator.tails.energy_max),
         energy_mean=generator.transform.mean,
+        azimuth=azimuth,
     )
+
+
+def _azimuth(generator: QuantileGenerator) -> Float32 | None:
+    """Evaluate the azimuth's network on its table's knots."""
+    if generator.azimuth is None:
+        return None
+    y = generator.pre_tanh(_logit_of_tail(TAIL_KNOTS))
+    cos_zenith = torch.sigmoid(generator.cos_zenith_logit(LEVEL_KNOTS.expand(len(y), -1), y))
+    cumulative = generator.azimuth.cumulative(y.repeat_interleave(len(LEVEL_KNOTS)), cos_zenith.flatten())
+    return (2 * cumulative - 1).float().reshape(len(TAIL_KNOTS), len(LEVEL_KNOTS), -1).numpy()
 
 
 @dataclass(frozen=True)
@@ -214,10 +233,10 @@ def _logit_of_tail(t: torch.Tensor) -> torch.Tensor:
     return torch.sign(t) * torch.log(2 * torch.exp(t.abs()) - 1)
 
 
-def _direction(g: Graph, logit: str, azimuth_latent: str) -> str:
+def _direction(g: Graph, logit: str, turn: str) -> str:
     """Return unit vectors [n, 3]; 1 - cos zenith comes from the odds, without a cancellation near the vertical."""
     odds = g("Exp", g("Neg", logit))
     cos_zenith = g("Reciprocal", g("Add", odds, 1.0))
     sine = g("Sqrt", g("Mul", g("Mul", odds, cos_zenith), g("Add", cos_zenith, 1.0)))
-    azimuth = g("Mul", azimuth_latent, float(np.pi))
+    azimuth = g("Mul", turn, float(np.pi))
     return matrix(g, g("Mul", sine, g("Cos", azimuth)), g("Mul", sine, g("Sin", azimuth)), g("Neg", cos_zenith))

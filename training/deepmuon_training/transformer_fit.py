@@ -12,6 +12,7 @@ from torch import nn
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import Muons
 from deepmuon_training.charge import CHARGE_SCHEDULE
+from deepmuon_training.checkpoint import fingerprint
 from deepmuon_training.fit import Schedule, fit
 from deepmuon_training.preprocessing import EnergyTransform
 from deepmuon_training.sliced_wasserstein import deepmuon_loss, random_directions, sliced_wasserstein
@@ -103,7 +104,8 @@ def fit_transformer(
     torch.manual_seed(seed)
     transform = EnergyTransform.fit(muons.kinetic_energy)
     network = Transformer(settings.d).to(device)
-    truth = features(muons, transform).to(device)
+    columns = features(muons, transform)
+    truth = columns.to(device)
     held = len(truth) - round(len(truth) * (1 - VALIDATION_FRACTION))
     training, validation = truth[:-held], truth[-held:]
     draws = settings.batch // settings.d
@@ -114,7 +116,7 @@ def fit_transformer(
         directions = random_directions(settings.directions, 3, random).to(device)
         return deepmuon_loss(as_rows(network(latent.to(device))), training[rows.to(device)], directions)
 
-    fixed = torch.Generator().manual_seed(seed + 1)
+    fixed = torch.Generator().manual_seed((seed + 1) % 2**64)
     validation_latent = (2 * torch.rand(-(-held // settings.d), LATENTS, generator=fixed) - 1).to(device)
     validation_directions = random_directions(_VALIDATION_DIRECTIONS, 3, fixed).to(device)
 
@@ -129,6 +131,7 @@ def fit_transformer(
         settings.schedule,
         seed=seed,
         name="transformer",
+        data=fingerprint(columns.numpy()) + f", batch {settings.batch}, {settings.directions} directions",
         checkpoint=checkpoint,
         progress=progress,
     )

@@ -1,0 +1,94 @@
+"""Checkpoints: what an interrupted fit goes on from, to the same result as an undisturbed one."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import pickle
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from deepmuon_runtime.errors import RefusedError
+from deepmuon_training.whole_file import write_whole
+
+__all__ = ["CHECKPOINTS", "Checkpoint", "fingerprint"]
+
+CHECKPOINTS = ("charge.pt", "azimuth.pt", "zenith.pt", "transformer.pt")
+"""Their names, each of one part of a fit."""
+
+_SECONDS = 30.0
+_DAMAGES = (OSError, RuntimeError, pickle.UnpicklingError, EOFError, LookupError, TypeError, AttributeError)
+
+
+def fingerprint(*columns: NDArray[Any]) -> str:
+    """Return a hash of numbers: other data of the same size have another."""
+    digest = hashlib.sha256()
+    for column in columns:
+        digest.update(f"{column.dtype} {column.shape}".encode())
+        digest.update(np.ascontiguousarray(column).data)
+    return digest.hexdigest()
+
+
+class Checkpoint:
+    """A file with the state of a fit, and what fit that is.
+
+    Parameters
+    ----------
+    path
+        The file; None for a fit that keeps none.
+    identity
+        What tells the fit from others, by name: the data's fingerprint, the seed, settings. The number of threads is
+        added, since others round otherwise.
+    """
+
+    def __init__(self, path: Path | None, **identity: object) -> None:
+        self._path = path
+        self._identity = {**identity, "number of threads": torch.get_num_threads()}
+        self._saved = time.monotonic()
+
+    @property
+    def is_due(self) -> bool:
+        """Whether half a minute has passed since the last one."""
+        return self._path is not None and time.monotonic() - self._saved > _SECONDS
+
+    def save(self, **parts: object) -> None:
+        """Replace the file, if one is kept: numbers, texts, tensors, and lists and dictionaries of them."""
+        if self._path is not None:
+            contents = io.BytesIO()
+            torch.save({"identity": self._identity, **parts}, contents)
+            write_whole(self._path, contents.getvalue(), overwrite=True)
+            self._saved = time.monotonic()
+
+    def load(self) -> dict[str, Any] | None:
+        """Return the parts that were saved last, or None where there is no file.
+
+        Raises
+        ------
+        RefusedError
+            If the file is no checkpoint, or one of another fit.
+        """
+        if self._path is None or not self._path.exists():
+            return None
+        try:
+            parts: dict[str, Any] = torch.load(self._path, weights_only=True, map_location="cpu")
+            found = parts.pop("identity")
+        except (
+            OSError,
+            RuntimeError,
+            pickle.UnpicklingError,
+            EOFError,
+            LookupError,
+            TypeError,
+            AttributeError,
+        ) as error:
+            raise RefusedError(f"{self._path} is no checkpoint of this version: remove it") from error
+        for name, value in self._identity.items():
+            if found.get(name) != value:
+                what = "other data" if name == "data" else f"the {name} {found.get(name)}, not of {value}"
+                raise RefusedError(f"{self._path} is a checkpoint of {what}: remove it, or keep the new ones elsewhere")
+        return parts
