@@ -1,0 +1,80 @@
+"""One process of the benchmark that is no deepmuon-gen: python benchmarks/job.py NAME COUNT SEED OUT.
+
+The arguments after NAME are those of the drivers of other generators. OUT is "-" where nothing is written.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import by_hand
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from deepmuon_runtime import Generator
+from deepmuon_runtime.latent import fill_latents
+from deepmuon_runtime.muon_file import COLUMNS
+from deepmuon_runtime.ordered_map import ordered_map
+
+__all__ = ["JOBS"]
+
+LATENTS = 5  # of a muon of the default architecture
+PIECE = 1 << 17
+
+
+def library(count: int, seed: int, out: str) -> None:
+    """Sample at sea level and let each piece go."""
+    for _ in Generator.open(0).chunks(count, seed):
+        pass
+
+
+def random_numbers(count: int, seed: int, out: str) -> None:
+    """Make the latents of so many muons, on all cores."""
+
+    def piece(first: int) -> None:
+        fill_latents(np.empty((min(PIECE, count - first), LATENTS), np.float32), seed, first)
+
+    for _ in ordered_map(piece, range(0, count, PIECE), len(os.sched_getaffinity(0))):
+        pass
+
+
+def write(count: int, seed: int, out: str) -> None:
+    """Write the bytes of so many muons, the same ones again and again, and flush them to the disk."""
+    muons = Generator.open(0).sample(min(count, PIECE), seed)
+    with h5py.File(out, "x") as file:
+        columns = {name: file.create_dataset(name, (count,), dtype) for name, (dtype, _) in COLUMNS.items()}
+        for first in range(0, count, PIECE):
+            end = min(first + PIECE, count)
+            for name, column in columns.items():
+                column[first:end] = getattr(muons, name)[: end - first]
+    with open(out, "rb") as file:
+        os.fsync(file.fileno())
+
+
+def by(sampler: Callable[[np.random.Generator], list[NDArray[Any]]]) -> Callable[[int, int, str], None]:
+    """Return a job that samples by hand and lets each piece go."""
+
+    def job(count: int, seed: int, out: str) -> None:
+        random = np.random.default_rng(seed)
+        for _ in range(0, count, by_hand.PIECE):
+            sampler(random)
+
+    return job
+
+
+JOBS: dict[str, Callable[[int, int, str], None]] = {
+    "library": library,
+    "random": random_numbers,
+    "write": write,
+    "accept-reject": by(by_hand.accept_reject),
+    "inverse-cdf": by(by_hand.inverse_cdf),
+}
+"""By the name that the command line takes."""
+
+
+if __name__ == "__main__":
+    JOBS[sys.argv[1]](int(sys.argv[2]), int(sys.argv[3]), sys.argv[4])

@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+REPOSITORY = Path(__file__).parents[2]
+RUN = REPOSITORY / "benchmarks" / "run.py"
+
+DRIVER = """#!/bin/sh
+# Stands for a driver of another generator: COUNT SEED OUT
+head -c $((20 * $1)) /dev/zero > "$3"
+"""
+
+
+@pytest.fixture
+def driver(tmp_path: Path) -> Path:
+    path = tmp_path / "driver"
+    path.write_text(DRIVER)
+    path.chmod(0o755)
+    return path
+
+
+def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    return subprocess.run([sys.executable, RUN, *arguments], capture_output=True, text=True, env=environment)
+
+
+def test_all_contestants_run_and_are_in_the_table_and_beside_it(driver: Path, tmp_path: Path):
+    output = tmp_path / "benchmark"
+    done = run("-n", "1000", "--repetitions", "1", "--cry", driver, "--linear", "--output", output)
+    assert done.returncode == 0, done.stderr
+    assert output.with_suffix(".md").read_text().startswith(done.stdout.removesuffix("\n"))
+    report = json.loads(output.with_suffix(".json").read_text())
+    rows = {row["name"]: row for row in report["rows"]}
+    assert {"deepmuon-gen", "library, no file", "CRY", "limit: writing alone"} < set(rows)
+    assert "EcoMug" not in rows
+    assert (rows["CRY"]["muons"], rows["CRY"]["bytes_per_muon"]) == (40, 20)
+    for name, row in rows.items():
+        assert f"| {name} |" in done.stdout
+        assert row["muons_per_second"] * row["seconds"][0] == pytest.approx(row["muons"])
+        assert row["peak_memory"] > 1e6
+    assert [(line["kind"], line["muons"]) for line in report["linear"]] == [
+        (kind, muons) for kind in ("to a file", "discarded") for muons in (10, 100, 1000, 10_000)
+    ]
+
+
+def test_a_program_that_fails_ends_the_benchmark_and_is_named(driver: Path):
+    driver.write_text("#!/bin/sh\nexit 7\n")
+    done = run("-n", "1000", "--cry", driver)
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"this failed: {driver} 1 ")
+
+
+@pytest.fixture(scope="module")
+def by_hand():
+    sys.path.insert(0, str(RUN.parent))
+    import by_hand
+
+    yield by_hand
+    sys.path.remove(str(RUN.parent))
+
+
+def test_both_samplers_by_hand_sample_the_same_flux(by_hand):
+    """Kolmogorov-Smirnov at 1e-6 false alarms each: 2.7 sqrt(2 / n)."""
+    random = np.random.default_rng(1)
+    n = by_hand.PIECE
+    for a, b in zip(by_hand.accept_reject(random), by_hand.inverse_cdf(random), strict=True):
+        both = np.concatenate([a, b])
+        distance = np.abs(np.searchsorted(np.sort(a), both) - np.searchsorted(np.sort(b), both)).max() / n
+        assert distance < 2.7 * np.sqrt(2 / n)
+
+
+def test_the_samplers_by_hand_sample_the_flux_that_is_published(by_hand):
+    """Means of log E and cos zenith against EcoMug's formula as deepmuon_training has it, at 5 standard deviations."""
+    flux = pytest.importorskip("deepmuon_training.flux")
+    muons = flux.sea_level_muons(by_hand.PIECE, seed=1, minimum=5e-4, maximum=1e3)
+    energy, _, _, w, _ = by_hand.inverse_cdf(np.random.default_rng(1))
+    for a, b in ((np.log(energy), np.log(muons.kinetic_energy)), (w, muons.w)):
+        assert abs(a.mean() - b.mean()) < 5 * np.sqrt((a.var() + b.var()) / len(a))
