@@ -281,9 +281,9 @@ def run_quietly(pipeline: Pipeline) -> None:
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
-        ({"layers": 2}, "holds a run with layers = 1, not layers = 2: give another folder"),
-        ({"seed": 2}, "holds a run with seed = 1, not seed = 2"),
-        ({"direct": True}, "holds a run with direct = false, not direct = true"),
+        ({"layers": 2}, r"other settings \(layers = 1 there, layers = 2 here\): give another folder"),
+        ({"seed": 2, "direct": True}, r"\(direct = false, seed = 1 there, direct = true, seed = 2 here\)"),
+        ({"density": 1.03}, r"\(nothing there, density = 1\.03 here\)"),
     ],
 )
 def test_the_folder_of_a_run_with_other_settings_is_refused(folder: Path, run: Path, change, complaint):

@@ -29,6 +29,7 @@ SETTINGS = st.builds(
     layers=st.integers(0, 100),
     layer_m=st.floats(0, 1e6, exclude_min=True),
     material=TEXT,
+    density=st.none() | st.floats(1e-3, 30),
     direct=st.booleans(),
     seed=st.integers(0, 2**64 - 1),
 )

@@ -116,6 +116,7 @@ def carry(layer: Layer, below: Layer, settings: PipelineSettings, folder: Path, 
         seed=layer.seed(settings, "transport"),
         muons_per_part=settings.muons_per_part,
         material=settings.material,
+        density=settings.density,
         folder=folder,
         progress=progress,
     )

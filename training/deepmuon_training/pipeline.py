@@ -25,6 +25,7 @@ from deepmuon_training import layer_steps
 from deepmuon_training.architectures import check_sample
 from deepmuon_training.evaluate import FEWEST_MUONS
 from deepmuon_training.layer_steps import Layer
+from deepmuon_training.material import check_material, medium
 from deepmuon_training.pipeline_settings import PipelineSettings
 from deepmuon_training.run_folder import run_folder
 from deepmuon_training.sample import read_sample
@@ -159,12 +160,16 @@ def plan(settings: PipelineSettings, sample: Path, folder: Path, held_out: Seque
     Raises
     ------
     RefusedError
-        If the sample can't be learned or carried on, or held-out muons are too few, or at no layer's depth.
+        If the sample can't be learned or carried on, the material is unknown, or held-out muons are too few or at no
+        layer's depth.
     """
     top = read_sample(sample)
     check_sample(top)
-    if top.depth_m > 0 and top.medium != settings.material and settings.layers:
-        raise RefusedError(f"muons under {top.depth_m:g} m of {top.medium} can't go on in {settings.material}")
+    overburden = medium(settings.material, settings.density)
+    if settings.layers:
+        check_material(settings.material, settings.density)
+        if top.depth_m > 0 and top.medium != overburden:
+            raise RefusedError(f"muons under {top.depth_m:g} m of {top.medium} can't go on in {overburden}")
     depths = [top.depth_m + number * settings.layer_m for number in range(settings.layers + 1)]
     by_depth = _by_depth(held_out, depths)
     layers: list[Layer] = []
@@ -236,7 +241,7 @@ def _steps(settings: PipelineSettings, layer: Layer, below: Layer | None, top: i
         )
     yield Step(
         "transport",
-        f"{layer.carried.name} through {settings.layer_m:g} m of {settings.material}",
+        f"{layer.carried.name} through {settings.layer_m:g} m of {medium(settings.material, settings.density)}",
         below.sample,
         lambda saved, progress: layer_steps.carry(layer, below, settings, saved, progress),
     )

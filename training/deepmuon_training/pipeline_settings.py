@@ -32,8 +32,8 @@ class PipelineSettings:
         Slabs below the sample's depth; 0 fits the sample and no more.
     layer_m
         Thickness of each slab in m.
-    material
-        Geant4's (NIST) name of what they are made of.
+    material, density
+        What they are made of, Geant4's (NIST) name or standard_rock, and its density in g/cm3 if not its own.
     muons
         Drawn from each generator to be carried through the slab below it; without effect where `direct`.
     muons_per_part
@@ -58,6 +58,7 @@ class PipelineSettings:
     layers: int = 5
     layer_m: float = 10.0
     material: str = "G4_WATER"
+    density: float | None = None
     muons: int = 4_000_000
     muons_per_part: int = 500_000
     scored_muons: int = 20_000_000

@@ -75,6 +75,9 @@ def _compare(stored: Path, origin: str, settings: Any) -> None:
     if stored.read_text(encoding="utf-8").partition("\n")[0] != origin:
         raise RefusedError(f"{stored.parent} holds the run of another sample: give another folder")
     others = settings_from(type(settings)(), read_table(stored), str(stored))
-    for there, here in zip(to_toml(others).splitlines(), to_toml(settings).splitlines(), strict=True):
-        if there != here:
-            raise RefusedError(f"{stored.parent} holds a run with {there}, not {here}: give another folder")
+    if others != settings:
+        there, here = (set(to_toml(some).splitlines()) for some in (others, settings))
+        differences = (
+            f"{', '.join(sorted(there - here)) or 'nothing'} there, {', '.join(sorted(here - there)) or 'nothing'} here"
+        )
+        raise RefusedError(f"{stored.parent} holds a run with other settings ({differences}): give another folder")

@@ -8,6 +8,7 @@ import tomllib
 from dataclasses import fields, is_dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
+from types import UnionType
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from deepmuon_runtime.errors import RefusedError
@@ -41,7 +42,8 @@ def settings_from(defaults: T, table: dict[str, Any], name: str) -> T:
     Parameters
     ----------
     defaults
-        Instance of a dataclass whose fields are bool, int, float, str, a literal or such dataclasses.
+        Instance of a dataclass whose fields are bool, int, float, str, one of these or None, a literal, or such
+        dataclasses.
     table
         Values by the names of the fields; what is left out stays. A whole number is written as an integer, or as
         in 4e6.
@@ -67,6 +69,8 @@ def settings_from(defaults: T, table: dict[str, Any], name: str) -> T:
 
 def _value(kind: Any, value: Any, name: str, default: Any) -> Any:
     """Return a value as its field's type."""
+    if get_origin(kind) is UnionType:  # a type or None, which TOML has not: the key is left out
+        kind = get_args(kind)[0]
     if is_dataclass(kind):
         if not isinstance(value, dict):
             raise RefusedError(f"{name} is {value!r}, and should be a table")
@@ -86,14 +90,14 @@ def _value(kind: Any, value: Any, name: str, default: Any) -> Any:
 
 
 def to_toml(settings: Any) -> str:
-    """Write a dataclass of settings as TOML, every value stated."""
+    """Write a dataclass of settings as TOML, every value stated but None."""
     return "\n".join(_lines(settings, "")) + "\n"
 
 
 def _lines(settings: Any, table: str) -> list[str]:
     values = {field.name: getattr(settings, field.name) for field in fields(settings)}
     inner = {key: value for key, value in values.items() if is_dataclass(value)}
-    lines = [f"{key} = {_scalar(value)}" for key, value in values.items() if key not in inner]
+    lines = [f"{key} = {_scalar(value)}" for key, value in values.items() if key not in inner and value is not None]
     for key, value in inner.items():
         name = f"{table}.{key}" if table else key
         scalars = [field for field in fields(value) if not is_dataclass(getattr(value, field.name))]

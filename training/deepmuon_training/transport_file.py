@@ -10,6 +10,7 @@ from tqdm import tqdm
 
 from deepmuon_runtime.errors import FailedError
 from deepmuon_runtime.muon_file import MuonWriter, read_attributes, read_muons
+from deepmuon_training.material import medium
 from deepmuon_training.sample import read_sample, write_sample
 from deepmuon_training.transport import below_slab, transport
 
@@ -24,6 +25,7 @@ def transport_file(
     seed: int,
     muons_per_part: int,
     material: str = "G4_WATER",
+    density: float | None = None,
     folder: Path,
     progress: bool = True,
 ) -> None:
@@ -38,7 +40,7 @@ def transport_file(
         Muon file on the upper plane.
     target
         The file to be written; it must not exist.
-    thickness, material
+    thickness, material, density
         As for `deepmuon_training.transport.transport`.
     seed
         Not negative; each part has one of its own, by its number.
@@ -57,6 +59,7 @@ def transport_file(
         If Geant4 fails, or nothing survives.
     """
     upper = read_sample(source, 0, 0)
+    overburden = medium(material, density)
     started = int(read_attributes(source)["count"])
     parts = []
     with tqdm(total=started, desc=target.stem, unit=" muons", unit_scale=True, disable=not progress) as bar:
@@ -69,6 +72,7 @@ def transport_file(
                     thickness,
                     seed=_part_seed(seed, index),
                     material=material,
+                    density=density,
                     progress=False,
                 )
                 write_sample(parts[-1], carried.sample)
@@ -76,10 +80,10 @@ def transport_file(
     survived = sum(int(read_attributes(part)["count"]) for part in parts)
     if survived == 0:
         raise FailedError(
-            f"none of {started} muons survived {thickness:g} m of {material}: carry more, or take a thinner slab"
+            f"none of {started} muons survived {thickness:g} m of {overburden}: carry more, or take a thinner slab"
         )
     how = f"seed {seed}, in parts of {muons_per_part}"
-    lower = below_slab(upper, started, survived, thickness, material, how)
+    lower = below_slab(upper, started, survived, thickness, overburden, how)
     with MuonWriter(target, lower.attributes) as writer:
         for part in parts:
             writer.append(read_muons(part))
