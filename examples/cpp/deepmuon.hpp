@@ -1,0 +1,84 @@
+// Cosmic-ray muons from a DeepMuon model, in C++17; header only.
+//
+//     deepmuon::Generator generator("quantile-10m.onnx");
+//     std::mt19937_64 random(1);
+//     for (const deepmuon::Muon& muon : generator.sample(1000, random)) { ... }
+//
+// OpenVINO runs the model where DEEPMUON_OPENVINO is defined, else ONNX Runtime. Errors are exceptions: what the engine
+// throws, which is a std::exception, or std::runtime_error if the file is no DeepMuon model.
+
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "muon.hpp"
+#ifdef DEEPMUON_OPENVINO
+#include "engine_openvino.hpp"
+#else
+#include "engine_onnxruntime.hpp"
+#endif
+
+namespace deepmuon {
+
+// A latent from 64 random bits, uniform and strictly inside (-1, 1): with s the upper 24 bits as a whole number, it is
+// (2 s + 1) / 2^24 - 1, an odd multiple of 2^-24, which float holds exactly.
+inline float latent(std::uint64_t bits) {
+    const auto s = static_cast<std::int32_t>(bits >> 40);
+    return static_cast<float>(2 * s + 1 - (1 << 24)) / (1 << 24);
+}
+
+class Generator {
+public:
+    explicit Generator(const std::string& model) : engine_(model), model_(model), metadata_(engine_.metadata()) {
+        if (metadata("contract_version") != "1") {
+            throw std::runtime_error(model + " keeps version " + metadata("contract_version") +
+                                     " of the contract, and this program reads version 1");
+        }
+        latent_size_ = std::stoul(metadata("latent_size"));
+        muons_per_draw_ = std::stoul(metadata("muons_per_draw"));
+    }
+
+    // What the model says of itself, such as metadata("rate_hz_per_m2"); docs/onnx_contract.md lists the keys.
+    const std::string& metadata(const std::string& key) const {
+        const auto found = metadata_.find("deepmuon." + key);
+        if (found == metadata_.end()) {
+            throw std::runtime_error(model_ + " does not say its deepmuon." + key);
+        }
+        return found->second;
+    }
+
+    // Muons from random bits: random() gives 64 of them, such as a std::mt19937_64.
+    template <class Random> std::vector<Muon> sample(std::size_t count, Random&& random) {
+        std::vector<Muon> muons;
+        muons.reserve(count);
+        while (muons.size() < count) {
+            const std::size_t missing = count - muons.size();
+            const std::size_t draws = std::min((missing - 1) / muons_per_draw_ + 1, 1 + largest_run / muons_per_draw_);
+            std::vector<float> latents(draws * latent_size_);
+            std::generate(latents.begin(), latents.end(), [&] { return latent(random()); });
+            const std::vector<Muon> made = run(latents);
+            muons.insert(muons.end(), made.begin(), made.begin() + std::min(made.size(), missing));
+        }
+        return muons;
+    }
+
+    // The muons of given latents, draw by draw.
+    std::vector<Muon> run(std::vector<float>& latents) { return engine_.run(latents, latents.size() / latent_size_); }
+
+private:
+    static constexpr std::size_t largest_run = 16384; // muons: what a processor's cache holds
+
+    Engine engine_;
+    std::string model_;
+    std::map<std::string, std::string> metadata_;
+    std::size_t latent_size_ = 0, muons_per_draw_ = 0;
+};
+
+} // namespace deepmuon

@@ -1,0 +1,44 @@
+// deepmuon-sample MODEL N SEED: writes N muons as CSV; what the model says of itself goes to the standard error.
+
+#include <charconv>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <random>
+#include <stdexcept>
+#include <string>
+
+#include "deepmuon.hpp"
+
+namespace {
+
+std::uint64_t whole_number(const std::string& text) {
+    std::uint64_t number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (error != std::errc() || end != text.data() + text.size()) {
+        throw std::runtime_error(text + " is no whole number");
+    }
+    return number;
+}
+
+} // namespace
+
+int main(int argc, char** argv) try {
+    if (argc != 4) {
+        std::fprintf(stderr, "usage: deepmuon-sample MODEL N SEED > muons.csv\n");
+        return 2;
+    }
+    const std::uint64_t count = whole_number(argv[2]);
+    std::mt19937_64 random(whole_number(argv[3]));
+    deepmuon::Generator generator(argv[1]);
+    std::fprintf(stderr, "%s, %s m of %s\n", generator.metadata("architecture").c_str(),
+                 generator.metadata("depth_m").c_str(), generator.metadata("medium").c_str());
+    std::printf("kinetic_energy,u,v,w,pdg_id\n");
+    for (const deepmuon::Muon& muon : generator.sample(count, random)) {
+        std::printf("%.9g,%.9g,%.9g,%.9g,%d\n", muon.kinetic_energy, muon.u, muon.v, muon.w, muon.pdg_id());
+    }
+    return 0;
+} catch (const std::exception& error) {
+    std::fprintf(stderr, "deepmuon-sample: %s\n", error.what());
+    return 1;
+}

@@ -1,0 +1,96 @@
+// exampleDeepMuon MODEL EVENTS: muons on a plate of plastic scintillator, 1 m x 1 m x 2 cm.
+
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "FTFP_BERT.hh"
+#include "G4Box.hh"
+#include "G4Event.hh"
+#include "G4LogicalVolume.hh"
+#include "G4NistManager.hh"
+#include "G4PVPlacement.hh"
+#include "G4RunManager.hh"
+#include "G4RunManagerFactory.hh"
+#include "G4Step.hh"
+#include "G4SystemOfUnits.hh"
+#include "G4UserEventAction.hh"
+#include "G4UserSteppingAction.hh"
+#include "G4VUserActionInitialization.hh"
+#include "G4VUserDetectorConstruction.hh"
+
+#include "DeepMuonAction.hh"
+
+class Plate : public G4VUserDetectorConstruction {
+    G4VPhysicalVolume* Construct() override {
+        auto* nist = G4NistManager::Instance();
+        auto* air = nist->FindOrBuildMaterial("G4_AIR");
+        auto* plastic = nist->FindOrBuildMaterial("G4_PLASTIC_SC_VINYLTOLUENE");
+        auto* world = new G4LogicalVolume(new G4Box("world", 11 * m, 11 * m, 2 * m), air, "world");
+        auto* plate = new G4LogicalVolume(new G4Box("plate", 0.5 * m, 0.5 * m, 1 * cm), plastic, "plate");
+        new G4PVPlacement(nullptr, {}, plate, "plate", world, false, 0);
+        return new G4PVPlacement(nullptr, {}, world, "world", nullptr, false, 0);
+    }
+};
+
+// Sums up the energy that each event leaves in the plate.
+class Deposits : public G4UserEventAction {
+public:
+    void BeginOfEventAction(const G4Event*) override { deposit_ = 0; }
+    void Add(G4double energy) { deposit_ += energy; }
+    void EndOfEventAction(const G4Event*) override {
+        hits += deposit_ > 0;
+        sum += deposit_;
+    }
+
+    inline static G4int hits = 0;
+    inline static G4double sum = 0;
+
+private:
+    G4double deposit_ = 0;
+};
+
+class Steps : public G4UserSteppingAction {
+public:
+    explicit Steps(Deposits& deposits) : deposits_(deposits) {}
+    void UserSteppingAction(const G4Step* step) override {
+        if (step->GetPreStepPoint()->GetPhysicalVolume()->GetName() == "plate") {
+            deposits_.Add(step->GetTotalEnergyDeposit());
+        }
+    }
+
+private:
+    Deposits& deposits_;
+};
+
+class Actions : public G4VUserActionInitialization {
+public:
+    explicit Actions(const std::string& model) : model_(model) {}
+    void Build() const override {
+        SetUserAction(new DeepMuonAction(model_, 20 * m, 1 * m));
+        auto* deposits = new Deposits;
+        SetUserAction(deposits);
+        SetUserAction(new Steps(*deposits));
+    }
+
+private:
+    std::string model_;
+};
+
+int main(int argc, char** argv) {
+    if (argc != 3) {
+        std::cerr << "usage: exampleDeepMuon MODEL EVENTS\n";
+        return 2;
+    }
+    std::unique_ptr<G4RunManager> manager(G4RunManagerFactory::CreateRunManager(G4RunManagerType::Serial));
+    manager->SetUserInitialization(new Plate);
+    manager->SetUserInitialization(new FTFP_BERT);
+    manager->SetUserInitialization(new Actions(argv[1]));
+    manager->Initialize();
+    manager->BeamOn(std::stoi(argv[2]));
+
+    const auto* muons = static_cast<const DeepMuonAction*>(manager->GetUserPrimaryGeneratorAction());
+    const G4double time = muons->LiveTime(std::stod(argv[2]));
+    std::cout << Deposits::hits << " hits in " << time / s << " s, " << Deposits::hits / (time / s) << " per second, "
+              << Deposits::sum / Deposits::hits / MeV << " MeV each\n";
+}

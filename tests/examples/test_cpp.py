@@ -1,0 +1,156 @@
+"""The C++ examples and the programs of the guide, built with OpenVINO as their pages say and run."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+import shutil
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+REPOSITORY = Path(__file__).parents[2]
+MODELS = REPOSITORY / "models" / "deepmuon_models"
+README = REPOSITORY / "examples" / "cpp" / "README.md"
+EMBEDDING = REPOSITORY / "docs" / "embedding.md"
+
+needs_openvino = pytest.mark.skipif(
+    not (find_spec("openvino") and shutil.which("cmake") and shutil.which("c++"))
+    and "openvino" not in os.environ.get("DEEPMUON_ENGINES", ""),
+    reason="OpenVINO's Python package, CMake and a C++ compiler are not all there",
+)
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    """Return the code of a page's blocks in a language, those in lists included."""
+    found = re.findall(rf"^( *)```{language}\n(.*?)^ *```$", page.read_text("utf-8"), re.MULTILINE | re.DOTALL)
+    return [re.sub(f"^{indent}", "", code, flags=re.MULTILINE) for indent, code in found]
+
+
+def shell(code: str, folder: Path) -> str:
+    """Run shell commands with this Python and without installing anything."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    command = ["bash", "-c", f"set -e; pip() {{ :; }}\n{code}"]
+    done = subprocess.run(command, cwd=folder, env={**os.environ, "PATH": path}, stdout=subprocess.PIPE, text=True)
+    print(done.stdout)
+    assert done.returncode == 0
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def readme(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The folder where the README's commands ran, and what they wrote."""
+    folder = tmp_path_factory.mktemp("cpp")
+    for part in ("examples", "models", "tests"):
+        (folder / part).symlink_to(REPOSITORY / part)
+    (code,) = blocks(README, "sh")
+    return folder, shell(code, folder)
+
+
+@needs_openvino
+def test_every_released_model_gives_its_test_vectors(readme: tuple[Path, str]):
+    _, written = readme
+    for model in MODELS.glob("*.onnx"):
+        assert re.search(rf"{model.name}: \d+ muons, energy \S+, direction \S+, charges 0$", written, re.MULTILINE)
+    assert "100% tests passed" in written
+
+
+@needs_openvino
+def test_other_muons_are_seen(readme: tuple[Path, str], tmp_path: Path):
+    folder, _ = readme
+    vectors = (REPOSITORY / "tests" / "vectors" / "quantile-0m.json").read_text("utf-8")
+    wrong = tmp_path / "wrong.json"
+    wrong.write_text(
+        vectors.replace('"charge": [1', '"charge": [-1')
+        if '"charge": [1' in vectors
+        else vectors.replace('"charge": [-1', '"charge": [1')
+    )
+    program = folder / "build" / "cpp" / "compare-vectors"
+    assert subprocess.run([program, MODELS / "quantile-0m.onnx", wrong]).returncode == 1
+    right_vectors_of_another = REPOSITORY / "tests" / "vectors" / "quantile-10m.json"
+    assert subprocess.run([program, MODELS / "quantile-0m.onnx", right_vectors_of_another]).returncode == 1
+
+
+def sampled(folder: Path, model: str, count: int, seed: int) -> np.ndarray:
+    command = [folder / "build" / "cpp" / "deepmuon-sample", MODELS / model, str(count), str(seed)]
+    written = subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True).stdout
+    header, *rows = csv.reader(written.splitlines())
+    assert header == ["kinetic_energy", "u", "v", "w", "pdg_id"]
+    return np.array(rows, dtype=float)
+
+
+@needs_openvino
+@pytest.mark.parametrize("model", ["quantile-10m.onnx", "transformer-10m.onnx"])
+def test_muons_by_seed_are_those_of_the_model(readme: tuple[Path, str], model: str):
+    folder, _ = readme
+    muons = sampled(folder, model, 50_000, 1)
+    assert len(muons) == 50_000
+    assert np.median(muons[:, 0]) == pytest.approx(3.14, rel=0.05)  # held-out muons: 3.142 GeV
+    np.testing.assert_allclose(np.linalg.norm(muons[:, 1:4], axis=1), 1, atol=1e-6)
+    assert np.all(muons[:, 3] < 0)
+    assert set(muons[:, 4]) == {-13, 13}
+    np.testing.assert_array_equal(sampled(folder, model, 1000, 1)[:128], muons[:128])
+    assert not np.any(sampled(folder, model, 1000, 2)[:, 0] == muons[:1000, 0])
+
+
+@needs_openvino
+def test_the_readme_shows_what_its_last_command_writes(readme: tuple[Path, str]):
+    _, written = readme
+    shown = np.array([row.split(",") for row in blocks(README, "text")[0].splitlines()[1:]], dtype=float)
+    found = np.array([row.split(",") for row in written.splitlines()[-len(shown) :]], dtype=float)
+    np.testing.assert_allclose(found, shown, rtol=2e-5, atol=2e-6)
+
+
+@needs_openvino
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["{model}", "1e3", "1"], "1e3 is no whole number"),
+        (["{model}", "-1", "1"], "-1 is no whole number"),
+        (["nothing.onnx", "1", "1"], "nothing.onnx"),
+        (["{foreign}", "1", "1"], "does not say its deepmuon.contract_version"),
+    ],
+)
+def test_what_is_wrong_is_said(readme: tuple[Path, str], tmp_path: Path, arguments: list[str], message: str):
+    import onnx
+
+    foreign = onnx.load(MODELS / "quantile-0m.onnx")
+    del foreign.metadata_props[:]
+    onnx.save(foreign, tmp_path / "foreign.onnx")
+    names = {"model": MODELS / "quantile-0m.onnx", "foreign": tmp_path / "foreign.onnx"}
+    command = [readme[0] / "build" / "cpp" / "deepmuon-sample", *(argument.format(**names) for argument in arguments)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert message in done.stderr
+    assert done.stdout == ""
+
+
+@needs_openvino
+def test_the_guides_program_builds_and_runs(tmp_path: Path):
+    shutil.copytree(REPOSITORY / "examples" / "cpp", tmp_path / "deepmuon")
+    (program,), (project,) = blocks(EMBEDDING, "cpp"), blocks(EMBEDDING, "cmake")
+    (tmp_path / "main.cpp").write_text(program)
+    (tmp_path / "CMakeLists.txt").write_text(project)
+    where, build = blocks(EMBEDDING, "sh")
+    assert (Path(shell(where, tmp_path).strip()) / "quantile-10m.onnx").exists()
+    last_line = shell(build, tmp_path).splitlines()[-1]
+    assert re.fullmatch(r"mean energy [78]\.\d+ GeV at 10 m, 55\.\d+ muons per second and m2", last_line)
+
+
+@pytest.mark.skipif(
+    not (REPOSITORY / "tests" / "engines" / "node_modules").exists()
+    and "onnxruntime-node" not in os.environ.get("DEEPMUON_ENGINES", ""),
+    reason="onnxruntime-node is not installed: `npm ci` in tests/engines does that",
+)
+def test_the_guides_javascript_runs(tmp_path: Path):
+    (tmp_path / "node_modules").symlink_to(REPOSITORY / "tests" / "engines" / "node_modules")
+    shutil.copyfile(MODELS / "quantile-10m.onnx", tmp_path / "quantile-10m.onnx")
+    (code,) = blocks(EMBEDDING, "js")
+    (tmp_path / "muons.mjs").write_text(code)
+    done = subprocess.run(["node", "muons.mjs"], cwd=tmp_path, stdout=subprocess.PIPE, check=True, text=True)
+    assert re.match(r"\d+\.\d+ Float32Array\(3\) \[", done.stdout)
