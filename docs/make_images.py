@@ -22,8 +22,7 @@ from deepmuon_training.smoothing_plot import draw_smoothing
 IMAGES = Path(__file__).parent / "images"
 MUONS = 10_000_000
 SEED = 1
-COLOURS = {0: "#d1495b", 10: "#00638a"}  # by depth in metres
-NAMES = {0: "sea level", 10: "under 10 m of water"}
+COLOURS = {0: "#d1495b", 10: "#e08d3c", 20: "#8a9a3b", 30: "#2e8b7d", 40: "#00638a", 50: "#3b3a78"}  # by depth [m]
 ENERGY_EDGES = np.geomspace(2e-3, 2e3, 121)
 ZENITH_EDGES = np.linspace(0, 90, 91)
 
@@ -72,7 +71,7 @@ def draw_generated(path: Path) -> None:
         zenith.set(
             xlabel="zenith angle / °", ylabel=r"$\mathrm{d}\Phi/\mathrm{d}\theta$  /  m$^{-2}$ s$^{-1}$ per degree"
         )
-        zenith.legend(frameon=False)
+        zenith.legend(frameon=False, fontsize="small", handlelength=1.2)
         figure.savefig(path, dpi=130)
 
 
@@ -90,8 +89,15 @@ def zenith_distribution(muons: Muons, rate: float) -> Float:
 
 def draw(axes: Axes, depth: int, edges: Float, values: Float) -> None:
     """Draw one distribution as a filled step line."""
-    axes.stairs(values, edges, baseline=None, color=COLOURS[depth], linewidth=1.6, label=NAMES[depth])
-    axes.stairs(values, edges, fill=True, color=COLOURS[depth], alpha=0.1)
+    axes.stairs(
+        values,
+        edges,
+        baseline=None,
+        color=COLOURS[depth],
+        linewidth=1.6,
+        label=f"{depth} m of water" if depth else "sea level",
+    )
+    axes.stairs(values, edges, fill=True, color=COLOURS[depth], alpha=0.05)
 
 
 if __name__ == "__main__":
