@@ -16,7 +16,7 @@ import click
 
 from deepmuon_cli.ending import REFUSED, SIGNALS, run
 
-__all__ = ["run_isolated", "show_life"]
+__all__ = ["run_isolated", "show_life", "take_time"]
 
 PATIENCE = 10.0  # s of computing
 
@@ -59,3 +59,8 @@ def run_isolated(command: click.Command, name: str) -> NoReturn:
 def show_life() -> None:
     """Ask for another ten seconds of computing, after which the process is ended by SIGPROF."""
     signal.setitimer(signal.ITIMER_PROF, PATIENCE)
+
+
+def take_time() -> None:
+    """End the limit of computing: nothing that may be damaged is read any more."""
+    signal.setitimer(signal.ITIMER_PROF, 0)

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import secrets
-from contextlib import suppress
 from pathlib import Path
 
-from deepmuon_runtime.errors import FailedError
-from deepmuon_runtime.muon_file import PARTIAL_SUFFIX, check_output, reason
-from deepmuon_runtime.publish import publish
+from deepmuon_runtime.whole_file import whole_file
 
 __all__ = ["write_whole"]
 
@@ -33,18 +28,5 @@ def write_whole(path: str | Path, contents: bytes, *, overwrite: bool = False) -
     FailedError
         If it can't be written all the same, or another process has written it meanwhile.
     """
-    target = check_output(path, overwrite)
-    partial = target.with_name(f"{target.name}.{secrets.token_hex(4)}{PARTIAL_SUFFIX}")
-    try:
-        with partial.open("xb") as file:
-            file.write(contents)
-            file.flush()
-            os.fsync(file.fileno())
-        publish(partial, target, overwrite)
-    except FileExistsError as error:
-        raise FailedError(f"{target} was written by another process meanwhile: kept as it is") from error
-    except OSError as error:
-        raise FailedError(f"{target} was not written: {reason(error)}") from error
-    finally:
-        with suppress(OSError):  # never made, or already in its place
-            partial.unlink()
+    with whole_file(path, overwrite=overwrite) as file:
+        file.write(contents)

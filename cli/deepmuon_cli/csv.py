@@ -1,0 +1,78 @@
+"""`deepmuon-csv`: a muon file as text."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NoReturn
+
+import click
+
+from deepmuon_cli.isolation import run_isolated, show_life
+
+__all__ = ["csv", "main"]
+
+NAME = "deepmuon-csv"
+FILE = click.Path(path_type=Path, allow_dash=True)
+
+
+@click.command(name=NAME, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.argument("file", type=FILE)
+@click.option(
+    "-o", "--output", type=FILE, metavar="FILE", required=True, help="The CSV file to be written; - is stdout."
+)
+@click.option("--units", type=click.Choice(("GeV", "MeV")), default="GeV", help="Unit of the energy; GeV if left out.")
+@click.option("--no-header", is_flag=True, help="No first line with the names of the columns.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing file, once the new one is complete.")
+@click.version_option(package_name="deepmuon-runtime", prog_name=NAME, message="%(prog)s %(version)s")
+def csv(file: Path, output: Path, units: str, no_header: bool, overwrite: bool) -> None:
+    """Write a muon file as comma-separated text, one muon a line.
+
+    \b
+        $ deepmuon-gen --depth 10 -n 1000 -q -o muons.h5
+        $ deepmuon-csv muons.h5 --units MeV -o muons.csv
+        $ head -n 1 muons.csv
+        kinetic_energy_MeV,u,v,w,pdg_id
+        $ wc -l < muons.csv
+        1001
+
+    Columns: kinetic energy in GeV or MeV; direction of motion u, v, w, a unit vector, z up; pdg_id, 13 for mu- and -13
+    for mu+. Nine digits keep every number as it is in the file.
+    """  # noqa: D301 - click looks for the character \b
+    from deepmuon_runtime.muon_text import csv_pieces
+    from deepmuon_runtime.whole_file import whole_file
+
+    pieces = (piece.encode() for piece in csv_pieces(file, unit=units, header=not no_header))
+    if str(output) == "-":
+        _print(pieces)
+        return
+    with whole_file(output, overwrite=overwrite) as text:
+        for piece in pieces:
+            text.write(piece)
+            show_life()
+
+
+def main() -> NoReturn:
+    """Run `deepmuon-csv`."""
+    run_isolated(csv, NAME)
+
+
+def _print(pieces: Iterator[bytes]) -> None:
+    """Write to stdout, unbuffered: nothing is left to be written when its reader has gone."""
+    from deepmuon_runtime.damaged import reason
+    from deepmuon_runtime.errors import FailedError
+
+    try:
+        with open(sys.stdout.fileno(), "wb", buffering=0, closefd=False) as stdout:
+            for piece in pieces:
+                left = memoryview(piece)
+                while left:
+                    left = left[stdout.write(left) :]
+                show_life()
+    except OSError as error:
+        raise FailedError(f"stdout was not written to its end: {reason(error)}") from error
+
+
+if __name__ == "__main__":
+    main()

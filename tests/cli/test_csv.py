@@ -1,0 +1,106 @@
+from __future__ import annotations
+
+import subprocess
+import sysconfig
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.worked_example import run_example
+
+from deepmuon_runtime import Generator, Muons, read_muons, write_muons
+
+COMMAND = Path(sysconfig.get_path("scripts")) / "deepmuon-csv"
+MUONS = 70_001
+
+
+@pytest.fixture
+def csv(tmp_path, model_file):
+    """Run the installed command in a folder with a muon file: exit code, stdout, stderr."""
+    Generator.open(file=model_file).write(tmp_path / "muons.h5", MUONS, seed=1)
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        done = subprocess.run([COMMAND, *arguments], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+        return done.returncode, done.stdout, done.stderr
+
+    return run
+
+
+def columns(text: str) -> np.ndarray:
+    return np.array([line.split(",") for line in text.splitlines()], dtype=np.float32).T
+
+
+def test_the_example_prints_what_its_help_says(tmp_path):
+    shown, printed = run_example(tmp_path, "deepmuon-csv")
+    assert printed == shown
+    assert shown.count("$ ") == 4
+
+
+def test_every_muon_is_there_to_the_last_bit(csv, tmp_path):
+    assert csv("muons.h5", "-o", "muons.csv") == (0, "", "")
+    header, rows = (tmp_path / "muons.csv").read_text(encoding="ascii").split("\n", 1)
+    assert header == "kinetic_energy_GeV,u,v,w,pdg_id"
+    muons = read_muons(tmp_path / "muons.h5")
+    for name, found in zip(("kinetic_energy", "u", "v", "w", "pdg_id"), columns(rows), strict=True):
+        np.testing.assert_array_equal(found, getattr(muons, name))
+
+
+def test_units_and_header_are_as_asked_for(csv):
+    gev, mev = (csv("muons.h5", "-o", "-", "--no-header", "--units", unit)[1] for unit in ("GeV", "MeV"))
+    assert gev[0].isdigit()
+    np.testing.assert_allclose(columns(mev)[0], 1000 * columns(gev)[0], rtol=1e-6)
+    np.testing.assert_array_equal(columns(mev)[1:], columns(gev)[1:])
+
+
+def test_stdout_gets_what_a_file_gets(csv, tmp_path):
+    csv("muons.h5", "-o", "muons.csv")
+    assert csv("muons.h5", "-o", "-") == (0, (tmp_path / "muons.csv").read_text(encoding="ascii"), "")
+
+
+def test_a_reader_that_goes_is_told_in_one_line(csv, tmp_path):
+    done = subprocess.run(
+        f"'{COMMAND}' muons.h5 -o - | head -n 1; exit ${{PIPESTATUS[0]}}",
+        shell=True,
+        executable="/bin/bash",
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert (done.returncode, done.stdout) == (1, "kinetic_energy_GeV,u,v,w,pdg_id\n")
+    assert done.stderr == "deepmuon-csv: stdout was not written to its end: Broken pipe\n"
+
+
+def test_a_file_of_no_muon_is_a_header(csv, tmp_path):
+    write_muons(tmp_path / "none.h5", Muons.empty(0), {"depth_m": 0.0, "medium": "G4_WATER"})
+    assert csv("none.h5", "-o", "-") == (0, "kinetic_energy_GeV,u,v,w,pdg_id\n", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["missing.h5", "-o", "muons.csv"], "missing.h5 can't be read"),
+        (["text.h5", "-o", "muons.csv"], "text.h5 can't be read"),
+        (["muons.h5"], "Missing option '-o'"),
+        (["muons.h5", "-o", "no/muons.csv"], "there is no folder"),
+        (["muons.h5", "-o", "."], "is a folder"),
+        (["muons.h5", "-o", "muons.csv", "--units", "keV"], "'keV' is not one of"),
+    ],
+)
+def test_what_can_t_be_done_is_refused_and_leaves_nothing(csv, tmp_path, arguments, reason):
+    (tmp_path / "text.h5").write_text("no HDF5")
+    before = sorted(tmp_path.iterdir())
+    code, out, err = csv(*arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("deepmuon-csv: ")
+    assert err.count("\n") == 1
+    assert reason in err
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_an_existing_output_is_replaced_only_where_asked(csv, tmp_path):
+    (tmp_path / "muons.csv").write_text("precious")
+    assert csv("muons.h5", "-o", "muons.csv")[0] == 2
+    assert (tmp_path / "muons.csv").read_text() == "precious"
+    assert csv("muons.h5", "-o", "muons.csv", "--overwrite") == (0, "", "")
+    assert (tmp_path / "muons.csv").read_text().count("\n") == MUONS + 1
