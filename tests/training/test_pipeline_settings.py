@@ -104,3 +104,8 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path):
     for name in (".", "missing.toml", "latin.toml"):
         with pytest.raises(RefusedError):
             read_pipeline_settings(tmp_path / name)
+
+
+@pytest.mark.parametrize(("name", "layers"), [("examples/pipeline/small.toml", 2), ("models/layered.toml", 5)])
+def test_the_settings_that_come_along_can_be_read(name: str, layers: int):
+    assert read_pipeline_settings(Path(__file__).parents[2] / name).layers == layers
