@@ -118,8 +118,9 @@ def as_text(report: dict[str, Any]) -> str:
     """Return the report as Markdown."""
     libraries = ", ".join(f"{name} {number}" for name, number in report["versions"].items())
     lines = [
-        f"{report['machine']}; Python {report['python']}, {libraries}.",
-        f"Medians of {report['repetitions']} runs of each, in turn.",
+        f"# {report['machine']}",
+        "",
+        f"Python {report['python']}, {libraries}. Medians of {report['repetitions']} runs of each, in turn.",
         "",
         *table(
             ["", "muons", "million muons/s", "deepmuon-gen is faster by", "peak memory", "start", "bytes/muon"],

@@ -27,7 +27,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_click",
 ]
-exclude_patterns = ["_build", "engines.md", "measured.md"]
+exclude_patterns = ["_build", "benchmark.md", "engines.md", "experiments", "measured.md"]
 default_role = "py:obj"  # `name` in a docstring is Python's
 smartquotes = False  # options have two dashes
 
