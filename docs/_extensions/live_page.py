@@ -71,13 +71,18 @@ def write_models(evaluations: Path, target: Path) -> None:
 
 def describe(model: Model, evaluations: Path) -> dict[str, object]:
     """Return what the page needs to know of a model: docs/live/models.js has it in words."""
+    if model.rate_hz_per_m2 is None:
+        raise ExtensionError(f"the live page needs the rate of {model.name}, which does not know it")
     evaluation = evaluations / f"{Path(model.name).stem}.json"
-    if model.rate_hz_per_m2 is None or not evaluation.exists():
-        raise ExtensionError(f"the live page needs the rate of {model.name}, and {evaluation}")
+    held_out = read_held_out(evaluation) if evaluation.exists() else None
+    return {field: getattr(model, field) for field in MODEL_FIELDS} | {"held_out": held_out}
+
+
+def read_held_out(evaluation: Path) -> dict[str, list[int]]:
+    """Return how the muons that a model was judged by are distributed."""
     spectra = json.loads(evaluation.read_text(encoding="utf-8"))["held_out_spectra"]
     by_energy = [sum(counts) for counts in zip(spectra["plus_by_energy"], spectra["minus_by_energy"], strict=True)]
-    held_out = {"by_energy": by_energy, "by_cos_zenith": spectra["by_cos_zenith"]}
-    return {field: getattr(model, field) for field in MODEL_FIELDS} | {"held_out": held_out}
+    return {"by_energy": by_energy, "by_cos_zenith": spectra["by_cos_zenith"]}
 
 
 def write_kept_files(target: Path) -> None:

@@ -11,7 +11,7 @@
  * @property {number} energy_min_gev
  * @property {number} energy_max_gev
  * @property {number} rate_hz_per_m2
- * @property {Counts} held_out
+ * @property {Counts | null} held_out muons that it was not trained on, where it was judged by some
  *
  * @typedef {object} Counts muons in the bins of the scores: see `EnergyBins` and `CosZenithBins`
  * @property {number[]} by_energy the first below, the last above the bins

@@ -38,7 +38,8 @@ export class Results {
      */
     begin(model, surface) {
         for (const id of ["made", "speed", "wait", "mean", "ratio", "unphysical"]) write(id, "–");
-        element("surface-key", HTMLElement).hidden = !surface;
+        element("surface-key", HTMLElement).hidden = !surface?.held_out;
+        element("held-out-key", HTMLElement).hidden = !model.held_out;
         again.hidden = true;
         this.spectra.draw(model, surface, undefined);
         this.sky.reset(model.rate_hz_per_m2);

@@ -6,6 +6,8 @@ import { CosZenithBins, EnergyBins } from "./tally.js";
 
 /** @typedef {import("./models.js").Model} Model */
 /** @typedef {import("./models.js").Counts} Counts */
+/** @typedef {{values: number[], errors: number[]}} Density */
+/** @typedef {null | undefined} Nothing */
 
 const ENERGY = logAxis("kinetic energy / GeV", -2, 3);
 const COS_ZENITH = linearAxis("cosine of the zenith angle", 1, 0.2);
@@ -32,74 +34,86 @@ export class Spectra {
      * @param {Counts | undefined} generated none if left out
      */
     draw(model, surface, generated) {
-        const { edges } = EnergyBins;
-        const spectrum = generated && density(byEnergy(generated), model.rate_hz_per_m2, LOG_ENERGY_WIDTH);
-        const held = density(byEnergy(model.held_out), model.rate_hz_per_m2, LOG_ENERGY_WIDTH);
-        const above = surface && density(byEnergy(surface.held_out), surface.rate_hz_per_m2, LOG_ENERGY_WIDTH);
-        const peak = edges[indexOfLargest((spectrum ?? held).values)];
-        this.energy.draw({
-            description: `Energy spectrum ${place(model.depth_m)}: most muons a decade near ${peak.toPrecision(2)} GeV`,
-            y: BY_LOG_ENERGY,
-            steps: [
-                ...(above ? [{ name: "surface", edges, values: above.values }] : []),
-                ...(spectrum ? [{ name: "generated", edges, values: spectrum.values }] : []),
-            ],
-            points: { edges, ...held },
-        });
-        this.drawZenith(model, generated);
+        const rate = model.rate_hz_per_m2;
+        this.drawEnergy(
+            place(model.depth_m),
+            generated && energyDensity(generated, rate),
+            model.held_out && energyDensity(model.held_out, rate),
+            surface?.held_out && energyDensity(surface.held_out, surface.rate_hz_per_m2),
+        );
+        this.drawZenith(
+            place(model.depth_m),
+            generated && zenithDensity(generated, rate),
+            model.held_out && zenithDensity(model.held_out, rate),
+        );
     }
 
     /**
-     * @param {Model} model
-     * @param {Counts | undefined} generated
+     * @param {string} where
+     * @param {Density | Nothing} generated
+     * @param {Density | Nothing} heldOut
+     * @param {Density | Nothing} surface
      */
-    drawZenith({ depth_m, rate_hz_per_m2, held_out }, generated) {
+    drawEnergy(where, generated, heldOut, surface) {
+        const { edges } = EnergyBins;
+        const shown = generated ?? heldOut;
+        const peak = shown && edges[shown.values.indexOf(Math.max(...shown.values))].toPrecision(2);
+        this.energy.draw({
+            description: peak ? `Energy spectrum ${where}: most muons a decade near ${peak} GeV` : "No muons yet",
+            y: BY_LOG_ENERGY,
+            steps: [
+                ...(surface ? [{ name: "surface", edges, values: surface.values }] : []),
+                ...(generated ? [{ name: "generated", edges, values: generated.values }] : []),
+            ],
+            points: heldOut ? { edges, ...heldOut } : undefined,
+        });
+    }
+
+    /**
+     * @param {string} where
+     * @param {Density | Nothing} generated
+     * @param {Density | Nothing} heldOut
+     */
+    drawZenith(where, generated, heldOut) {
         const { edges } = CosZenithBins;
-        const distribution = generated && density(byZenith(generated), rate_hz_per_m2, COS_ZENITH_WIDTH);
-        const held = density(byZenith(held_out), rate_hz_per_m2, COS_ZENITH_WIDTH);
-        const flat = sum((distribution ?? held).values.slice(0, HALF)) * COS_ZENITH_WIDTH;
+        const shown = (heldOut ?? generated)?.values ?? [1];
+        const flat = (100 * sum(shown.slice(0, HALF))) / sum(shown);
         this.zenith.draw({
             description:
-                `Zenith distribution ${place(depth_m)}: it falls from the zenith to the horizon, and ` +
-                `${((100 * flat) / rate_hz_per_m2).toPrecision(2)} % come from more than 60 degrees`,
-            y: roundAxis(BY_COS_ZENITH, 1.05 * Math.max(...held.values)),
-            steps: distribution ? [{ name: "generated", edges, values: distribution.values }] : [],
-            points: { edges, ...held },
+                `Zenith distribution ${where}: it falls from the zenith to the horizon, and ` +
+                `${flat.toPrecision(2)} % come from more than 60 degrees`,
+            y: roundAxis(BY_COS_ZENITH, 1.05 * Math.max(...shown)),
+            steps: generated ? [{ name: "generated", edges, values: generated.values }] : [],
+            points: heldOut ? { edges, ...heldOut } : undefined,
         });
     }
 }
 
-/** @param {Counts} counts */
-function byEnergy({ by_energy }) {
-    return { total: sum(by_energy), inBins: by_energy.slice(1, -1) };
+/** @param {Counts} counts @param {number} rate */
+function energyDensity({ by_energy }, rate) {
+    return density(by_energy.slice(1, -1), rate / sum(by_energy) / LOG_ENERGY_WIDTH);
 }
 
-/** @param {Counts} counts */
-function byZenith({ by_cos_zenith }) {
-    return { total: sum(by_cos_zenith), inBins: by_cos_zenith };
+/** @param {Counts} counts @param {number} rate */
+function zenithDensity({ by_cos_zenith }, rate) {
+    return density(by_cos_zenith, rate / sum(by_cos_zenith) / COS_ZENITH_WIDTH);
 }
 
 /**
  * Counts as a rate per unit of the axis, and its standard error.
  *
- * @param {{total: number, inBins: number[]}} counts
- * @param {number} rate of all muons
- * @param {number} width of a bin
+ * @param {number[]} counts
+ * @param {number} scale
+ * @returns {Density}
  */
-function density({ total, inBins }, rate, width) {
-    const scale = rate / (total * width);
+function density(counts, scale) {
     return {
-        values: inBins.map((count) => scale * count),
-        errors: inBins.map((count) => scale * Math.sqrt(count)),
+        values: counts.map((count) => scale * count),
+        errors: counts.map((count) => scale * Math.sqrt(count)),
     };
 }
 
 /** @param {number[]} numbers */
 function sum(numbers) {
     return numbers.reduce((total, number) => total + number, 0);
-}
-
-/** @param {number[]} numbers */
-function indexOfLargest(numbers) {
-    return numbers.indexOf(Math.max(...numbers));
 }
