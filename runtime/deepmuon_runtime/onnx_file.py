@@ -16,6 +16,7 @@ __all__ = ["LARGEST_IR_VERSION", "LARGEST_OPSET", "check_onnx_file"]
 LARGEST_IR_VERSION = 9
 LARGEST_OPSET = 20
 
+LARGEST_COUNT = 1_000_000  # of outputs, for instance, for which ONNX Runtime takes memory before it counts them
 MOST_FIELDS = 1_000_000  # seconds of walking
 DEEPEST = 30  # messages inside of messages: a graph inside of a graph is three deeper
 
@@ -93,6 +94,11 @@ def _check_location(location: int) -> None:
         raise _BreachError("it keeps numbers in another file")
 
 
+def _check_count(number: int) -> None:
+    if LARGEST_COUNT < number < 1 << 63:  # above it is below 0
+        raise _BreachError(f"an attribute of an operator is {number}, and should be {LARGEST_COUNT} at most")
+
+
 def _shown(text: memoryview) -> str:
     return ascii(str(text[:40], "utf-8", "replace"))
 
@@ -118,6 +124,7 @@ MESSAGES = {
 NUMBERS: dict[tuple[str, int], Callable[[int], None]] = {
     ("model", 1): _at_most(LARGEST_IR_VERSION, "IR version"),
     ("opset", 2): _at_most(LARGEST_OPSET, "opset"),
+    ("attribute", 3): _check_count,
     ("tensor", 14): _check_location,
 }
 TEXTS: dict[tuple[str, int], Callable[[memoryview], None]] = {

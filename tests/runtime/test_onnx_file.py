@@ -86,6 +86,7 @@ def function(model: ModelProto) -> None:
         (add_node(helper.make_node("Loop", ["m", "c"], ["y"])), "Loop could go on for ever"),
         (add_node(if_node(helper.make_node("Scan", ["m"], ["y"]))), "Scan could go on for ever"),
         (add_node(nested(12)), "nested without reason"),
+        (add_node(helper.make_node("Split", ["a"], ["b"], num_outputs=2**31)), "of an operator is 2147483648"),
         (lambda model: external(model.graph.initializer[0]), "keeps numbers in another file"),
         (lambda model: located(model.graph.initializer[0]), "keeps numbers in another file"),
         (add_node(constant(value=external(tensor()))), "keeps numbers in another file"),
