@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 import torch
 
 from deepmuon_runtime import Generator
@@ -27,13 +26,12 @@ from deepmuon_training.fitted import export_fitted
 from deepmuon_training.plots import draw_pictures
 from deepmuon_training.sample import (
     HELD_OUT_CRY_MUONS,
-    MINIMUM_ENERGY,
     Sample,
     read_cry,
     read_sample,
     write_sample,
 )
-from deepmuon_training.smoothing import StepSmoother
+from deepmuon_training.smoothing import StepSmoother, smoothed
 from deepmuon_training.transport import transport
 from deepmuon_training.vectors import muon_vectors
 
@@ -90,14 +88,6 @@ def make_sea_level(cry: Path, work: Path) -> None:
     write_sample(sample_file(work, "testing", 0, "-raw"), testing)
     for part, sample in (("training", training), ("testing", testing)):
         write_sample(sample_file(work, part, 0), smoothed(sample, smooth))
-
-
-def smoothed(sample: Sample, smooth: StepSmoother) -> Sample:
-    """Take the steps of CRY's tables out."""
-    muons = smooth(sample.muons)
-    kept = muons.kinetic_energy >= MINIMUM_ENERGY
-    what = f"steps of CRY's tables taken out, {np.sum(~kept)} muons moved below 1 MeV dropped"
-    return sample.then(what, muons=muons[kept], rate=sample.rate * float(np.mean(kept)), smoothed=True)
 
 
 def make_deep(cry: Path, more_cry: Path, work: Path) -> None:
