@@ -14,9 +14,12 @@ if TYPE_CHECKING:
     from deepmuon_training.evaluate import Evaluation
     from deepmuon_training.independence import Independence
 
-__all__ = ["TARGETS", "Score", "Target", "judge", "markdown_table", "scorecard"]
+__all__ = ["TABLE_HEAD", "TARGETS", "Score", "Target", "judge", "markdown_table", "scorecard", "table_rows"]
 
 _KS_SPREAD = 0.26 / 0.87  # standard deviation over mean of Kolmogorov's distribution
+
+
+TABLE_HEAD = ("score", "measured", "alike samples", "sigma", "target", "verdict")
 
 
 @dataclass(frozen=True)
@@ -91,18 +94,19 @@ def judge(scores: Iterable[Score], architecture: str | None) -> tuple[Score, ...
     )
 
 
-def markdown_table(scores: Iterable[Score]) -> str:
-    """Write scores as a Markdown table."""
-    rows = [
-        "| score | measured | alike samples | sigma | target | verdict |",
-        "|---|---|---|---|---|---|",
-    ]
-    rows += [
-        f"| {score.name} | {_number(score.value)} | {_alike(score)} | {_sigma(score)} "
-        f"| {score.target or ''} | {_verdict(score)} |"
+def table_rows(scores: Iterable[Score]) -> list[tuple[str, ...]]:
+    """Write each score in the words of `TABLE_HEAD`."""
+    return [
+        (score.name, _number(score.value), _alike(score), _sigma(score), score.target or "", _verdict(score))
         for score in scores
     ]
-    return "\n".join(rows) + "\n"
+
+
+def markdown_table(scores: Iterable[Score]) -> str:
+    """Write scores as a Markdown table."""
+    rows = [[cell.replace("|", "\\|") for cell in row] for row in (TABLE_HEAD, *table_rows(scores))]
+    lines = [f"| {' | '.join(row)} |" for row in rows]
+    return "\n".join([lines[0], "|---" * len(TABLE_HEAD) + "|", *lines[1:]]) + "\n"
 
 
 def _scores(evaluation: Evaluation) -> Iterator[Score]:
@@ -172,7 +176,7 @@ def _chi_square_score(name: str, chi_square: ChiSquare) -> Score:
 
 def _judged(score: Score, target: Target) -> Score:
     quantity = {"value": score.value, "excess": score.excess, "sigma": score.sigma and abs(score.sigma)}[target.of]
-    words = {"value": "", "excess": "excess ", "sigma": "\\|sigma\\| "}[target.of] + f"≤ {target.limit:g}"
+    words = {"value": "", "excess": "excess ", "sigma": "|sigma| "}[target.of] + f"≤ {target.limit:g}"
     return replace(score, target=words, met=None if quantity is None else quantity <= target.limit)
 
 
