@@ -22,6 +22,8 @@ export class Sky {
         this.exposure = new OffscreenCanvas(1, 1);
         this.film = /** @type {OffscreenCanvasRenderingContext2D} */ (this.exposure.getContext("2d"));
         this.muons = new Float32Array(3 * KEPT); // energy, u and v of each
+        this.half = 0; // radius of the sky, in pixels of the canvas
+        this.pixel = 1; // a pixel of the style sheet, in those
         this.known = 0;
         this.rate = 0;
         this.playing = false;
@@ -120,15 +122,12 @@ export class Sky {
     resize() {
         const size = Math.round(this.canvas.clientWidth * Math.min(FINEST, devicePixelRatio));
         if (size === this.canvas.width || size === 0) return;
+        this.half = size / 2;
+        this.pixel = size / this.canvas.clientWidth;
         this.canvas.width = this.canvas.height = size;
         this.exposure.width = this.exposure.height = size;
         this.rewind();
         if (!this.playing) this.rest();
-    }
-
-    /** What one share, and one CSS pixel, are in pixels of the canvas. */
-    get scale() {
-        return { half: this.canvas.width / 2, pixel: this.canvas.width / Math.max(1, this.canvas.clientWidth) };
     }
 
     /**
@@ -138,14 +137,14 @@ export class Sky {
      * @param {number} opacity
      */
     expose({ x, y, colour }, opacity) {
-        const { half, pixel } = this.scale;
+        const { half, pixel } = this;
         this.film.globalAlpha = opacity;
         this.film.fillStyle = colour;
         this.film.fillRect(half + x * half * RIM, half + y * half * RIM, POINT * pixel, POINT * pixel);
     }
 
     paint() {
-        const { half } = this.scale;
+        const { half } = this;
         this.context.globalAlpha = 1;
         this.context.clearRect(0, 0, 2 * half, 2 * half);
         this.paintDome();
@@ -155,7 +154,7 @@ export class Sky {
 
     paintDome() {
         const { context } = this;
-        const { half, pixel } = this.scale;
+        const { half, pixel } = this;
         const dome = context.createRadialGradient(half, half, 0, half, half, half * RIM);
         dome.addColorStop(0, "#0b1533");
         dome.addColorStop(1, "#1c2b57");
@@ -177,7 +176,7 @@ export class Sky {
     /** @param {Arrival} arrival */
     paintFlash({ x, y, radius, colour, time }) {
         const { context } = this;
-        const { half, pixel } = this.scale;
+        const { half, pixel } = this;
         const age = (this.seconds - time) / FLASH;
         const [centreX, centreY] = [half + x * half * RIM, half + y * half * RIM];
         context.fillStyle = context.strokeStyle = colour;
