@@ -50,7 +50,6 @@ def command(
     \b
         $ deepmuon-train evaluate model.onnx held_out.h5 -n 1e6 -o report.html
         | score | measured | alike samples | sigma | target | verdict |
-        |---|---|---|---|---|---|
         | KS energy | 0.002524 | 0.002131 ± 0.00064 |  | excess ≤ 0.001 | met |
         ...
         report.html: 1,000,000 generated muons against 200,000 of held_out.h5, seed 1
