@@ -18,8 +18,8 @@ FALSE_ALARM = 1e-4
 def measure_uniformity(muons: Muons) -> ChiSquare:
     """Chi-square of the azimuth's harmonics 1 to 4 below 1 GeV, from 1 to 10 GeV, and above, being zero.
 
-    In each energy range, ``2 n sum_k |mean exp(i k azimuth)|^2`` (Rayleigh's statistic, for four harmonics; K. V. Mardia
-    and P. E. Jupp, "Directional Statistics", Wiley 2000, section 6.3) has 8 degrees of freedom.
+    In each energy range, ``2 n sum_k |mean exp(i k azimuth)|^2`` (Rayleigh's statistic, for four harmonics; K. V.
+    Mardia and P. E. Jupp, "Directional Statistics", Wiley 2000, section 6.3) has 8 degrees of freedom.
     Assumes independent muons. A range of fewer than 1000 is left out.
     """
     total, ndf = 0.0, 0
