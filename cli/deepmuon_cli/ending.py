@@ -41,11 +41,16 @@ def run(command: click.Command, name: str) -> NoReturn:
     name
         What the user typed to start it.
     """
-    warnings.showwarning = lambda message, *_, **__: click.echo(f"{name}: warning: {_printable(message)}", err=True)
+    warnings.showwarning = lambda message, *_, **__: _say(f"{name}: warning:", message, "yellow")
     code, reason = _Stopping().outcome(lambda: _outcome(command, name))
     if reason:
-        click.echo(f"{name}: {_printable(reason)}", err=True)
+        _say(f"{name}:", reason, "red")
     sys.exit(code)
+
+
+def _say(beginning: str, message: object, colour: str) -> None:
+    """Write a line to stderr; click leaves the colour out where that is no terminal."""
+    click.echo(f"{click.style(beginning, fg=colour)} {_printable(message)}", err=True)
 
 
 def _printable(message: object) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
+from deepmuon_cli.completion import architectures, depths, devices
 from deepmuon_cli.ending import run
 from deepmuon_cli.numbers import muon_number, positive_number, seed_number, shard_number
 
@@ -24,8 +25,19 @@ FILE = click.Path(path_type=Path)
 
 
 @click.command(name=NAME, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
-@click.option("--depth", type=float, metavar="METRES", help="Metres of water above the muons (see --list).")
-@click.option("--architecture", metavar="NAME", help="quantile or transformer; the better one if left out.")
+@click.option(
+    "--depth",
+    type=float,
+    metavar="METRES",
+    shell_complete=depths,
+    help="Metres of water above the muons (see --list).",
+)
+@click.option(
+    "--architecture",
+    metavar="NAME",
+    shell_complete=architectures,
+    help="quantile or transformer; the better one if left out.",
+)
 @click.option("--model", type=FILE, metavar="FILE", help="Your own ONNX model, instead of --depth.")
 @click.option("-n", "--number", type=muon_number, metavar="NUMBER", help="How many muons: 1e7, 10_000_000.")
 @click.option(
@@ -48,6 +60,7 @@ FILE = click.Path(path_type=Path)
     "--device",
     default="auto",
     metavar="NAME",
+    shell_complete=devices,
     help="cpu, cuda, or auto (the default): cuda if it can be had.",
 )
 @click.option("--threads", type=int, help="Computing side by side; if left out, as many as may be used.")

@@ -348,3 +348,35 @@ def test_a_warning_is_one_line(gen, model_file, tmp_path, monkeypatch):
     )
     assert done.stderr.startswith("deepmuon-gen: warning: onnxruntime and onnxruntime-gpu are both installed")
     assert done.stderr.count("\n") == 1
+
+
+def test_messages_have_colours_on_a_terminal_only(tmp_path):
+    asked = [*COMMAND, "-n", "1"]
+    piped = subprocess.run(asked, capture_output=True, cwd=tmp_path, check=False).stderr
+    controller, terminal = pty.openpty()
+    subprocess.run(asked, stderr=terminal, cwd=tmp_path, check=False)
+    os.close(terminal)
+    shown = os.read(controller, 10_000)
+    os.close(controller)
+    assert b"\x1b[" not in piped
+    assert b"\x1b[31mdeepmuon-gen:\x1b[0m which muons?" in shown
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("--de", ["--depth", "--device"]),
+        ("--depth ", ["0", "10"]),
+        ("--architecture t", ["transformer"]),
+        ("--device cu", ["cuda"]),
+    ],
+)
+def test_the_shell_completes_options_and_their_values(words, offered):
+    line = f"deepmuon-gen {words}"
+    environment = os.environ | {
+        "_DEEPMUON_GEN_COMPLETE": "bash_complete",
+        "COMP_WORDS": line,
+        "COMP_CWORD": str(line.count(" ")),
+    }
+    done = subprocess.run(COMMAND, env=environment, capture_output=True, text=True, check=True)
+    assert {f"plain,{word}" for word in offered} <= set(done.stdout.split())
