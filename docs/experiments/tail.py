@@ -8,7 +8,6 @@ The muons are streamed: only those above the energy where the power law begins a
 from __future__ import annotations
 
 import re
-import time
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -60,16 +59,13 @@ def main(depth: float, number: int) -> None:
     """Sample, compare, write."""
     generator = Generator.open(depth)
     law = power_law(generator.model)
-    start = time.perf_counter()
     muons = tail(generator, number, law.lowest)
-    seconds = time.perf_counter() - start
     scores = [score(law, muons, number, probability) for probability in PROBABILITIES]
     far = muons[muons.kinetic_energy > law.quantile(1e-7)]
     numbers = {
         "model": generator.model.name,
         "muons": number,
         "seed": SEED,
-        "seconds": seconds,
         "power_law": law._asdict(),
         "kept": len(muons),
         "expected_kept": number * law.level,
@@ -169,7 +165,7 @@ def draw(muons: Muons, law: PowerLaw, number: int) -> Figure:
         spectrum.axvline(law.quantile(1e-7), color=COLOURS[5], linewidth=0.8, linestyle=":")
         spectrum.text(law.quantile(1e-7) * 1.05, rank[-1] / 3, "one muon in ten million", fontsize=9)
         spectrum.set(ylabel="muons above E")
-        spectrum.legend()
+        spectrum.legend(loc="lower left")
         noise = 1 / np.sqrt(expected)
         ratio.fill_between(energy, 1 - noise, 1 + noise, color=COLOURS[1], alpha=0.2, linewidth=0)
         ratio.plot(energy, rank / expected, drawstyle="steps-post", color=COLOURS[0])
