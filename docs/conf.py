@@ -14,7 +14,7 @@ os.environ.update(without_data_sets())  # for the modules that import geant4_pyb
 
 project = "DeepMuon"
 author = "The DeepMuon developers"
-copyright = f"2025, {author}"
+copyright = f"2026, {author}"
 release = version = version_of("deepmuon-runtime")
 
 extensions = [

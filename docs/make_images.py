@@ -97,7 +97,6 @@ def draw(axes: Axes, depth: int, edges: Float, values: Float) -> None:
         linewidth=1.6,
         label=f"{depth} m of water" if depth else "sea level",
     )
-    axes.stairs(values, edges, fill=True, color=COLOURS[depth], alpha=0.05)
 
 
 if __name__ == "__main__":

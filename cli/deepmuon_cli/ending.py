@@ -131,6 +131,8 @@ def _outcome(command: click.Command, name: str) -> tuple[int, str]:
     try:
         code = command.main(prog_name=name, standalone_mode=False)  # that of click.Context.exit, or None
     except click.ClickException as error:
+        if isinstance(error, click.NoSuchOption) and error.possibilities:
+            del error.possibilities[1:]  # after the nearest come distant ones
         return REFUSED, " ".join(error.format_message().split())
     except Exception as error:
         from deepmuon_runtime.errors import FailedError, RefusedError

@@ -56,7 +56,11 @@ class IncludeAll(SphinxDirective):
         if "pictures" not in self.options:
             return []
         pictures = sorted((folder / self.options["pictures"] / name).glob("*.png"))
-        return [f"![{picture.stem}]({picture.relative_to(folder).as_posix()})" for picture in pictures]
+        return [f"![{_alt(picture.stem, name)}]({picture.relative_to(folder).as_posix()})" for picture in pictures]
+
+
+def _alt(quantity: str, name: str) -> str:
+    return f"{quantity} of {name}: generated and held-out muons, and their ratio"
 
 
 def setup(app: Sphinx) -> ExtensionMetadata:

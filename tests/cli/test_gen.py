@@ -350,6 +350,10 @@ def test_a_warning_is_one_line(gen, model_file, tmp_path, monkeypatch):
     assert done.stderr.count("\n") == 1
 
 
+def test_an_option_that_is_misspelt_is_told_with_the_nearest_one(gen):
+    assert gen("--dept", "10") == (2, "", "deepmuon-gen: No such option '--dept'. Did you mean '--depth'?\n")
+
+
 def test_messages_have_colours_on_a_terminal_only(tmp_path):
     asked = [*COMMAND, "-n", "1"]
     piped = subprocess.run(asked, capture_output=True, cwd=tmp_path, check=False).stderr
