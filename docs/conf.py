@@ -23,6 +23,7 @@ extensions = [
     "mathml",
     "myst_parser",
     "released_models",
+    "score_summary",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx_click",

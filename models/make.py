@@ -21,7 +21,7 @@ import torch
 from deepmuon_runtime import Generator
 from deepmuon_training.architectures import fit_generator
 from deepmuon_training.card import card, manifest_entry
-from deepmuon_training.evaluate import evaluate
+from deepmuon_training.evaluate import Evaluation, evaluate
 from deepmuon_training.fitted import export_fitted
 from deepmuon_training.plots import draw_pictures
 from deepmuon_training.sample import (
@@ -159,10 +159,15 @@ def evaluate_model(
     pictures.mkdir(parents=True, exist_ok=True)
     (EVALUATIONS / f"{path.stem}.json").write_text(evaluation.to_json())
     draw_pictures(evaluation, pictures, title=f"{model.architecture}, {depth} m")
+    write_card(path, evaluation, sample, notes)
+
+
+def write_card(path: Path, evaluation: Evaluation, sample: Sample, notes: list[str]) -> None:
+    """Write the model's card beside its file, and show it."""
+    depth, architecture = round(sample.depth_m), path.stem.partition("-")[0]
     more = "--more-cry cry_40M.h5 " if depth >= DEEP else ""
     command = (
-        f"python models/make.py --cry cry_sea_level.h5 {more}--work work "
-        f"--depth {depth} --architecture {model.architecture}"
+        f"python models/make.py --cry cry_sea_level.h5 {more}--work work --depth {depth} --architecture {architecture}"
     )
     text = card(path, evaluation, command=command, provenance=sample.provenance, notes=notes)
     path.with_suffix(".md").write_text(text)

@@ -16,8 +16,8 @@ __all__ = ["GENERAL_LIMITS", "card", "manifest_entry"]
 GENERAL_LIMITS = (
     "Single muons: no bundles of one shower, no arrival times.",
     "Geant4's muon-nuclear interaction is left out; the overburden is a flat, laterally infinite slab of fresh water.",
-    "CRY gives about 111 muons per second and m2 at sea level where other fluxes give 130; a charge ratio of 1.07 there, "
-    "falling with energy and depth, instead of 1.27 and rising; no east-west effect, and one date and latitude.",
+    "CRY gives about 111 muons per second and m2 at sea level where other fluxes give 130; a charge ratio of 1.07 "
+    "there, falling with energy and depth, instead of 1.27 and rising; no east-west effect, and one date and latitude.",
 )
 """What no model trained on CRY and Geant4 knows."""
 

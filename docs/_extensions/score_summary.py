@@ -1,0 +1,72 @@
+"""The directive ``score-summary``: the scores of all released models in short, a row each, from their evaluations.
+
+::
+
+    ```{score-summary} evaluations
+    ```
+
+The folder, relative to the page, holds NAME.json as `deepmuon_training.evaluate.Evaluation` writes it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+from sphinx.util.typing import ExtensionMetadata
+
+from deepmuon_training.evaluate import Evaluation
+from deepmuon_training.scorecard import Score
+
+__all__ = ["setup"]
+
+COLUMNS = {
+    "KS energy": "KS energy",
+    "KS cos zenith": "KS cos zenith",
+    "delta": "cells: delta",
+    "worst energy bin": "energy bin",
+    "above 100 GeV": "tail above 100 GeV",
+    "charge χ²/ndf": "charge by cell",
+    "AUC": "classifier",
+}
+"""Heads, and how the score's name begins."""
+
+
+class ScoreSummary(SphinxDirective):
+    """The directive."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """Make the table."""
+        folder = Path(self.env.doc2path(self.env.docname)).parent / self.arguments[0]
+        files = sorted(folder.glob("*.json"), key=_architecture_and_depth)
+        head = ["", *COLUMNS, "targets met"]
+        lines = [head, ["---", *["--:"] * (len(head) - 1)], *(_row(file) for file in files)]
+        for file in files:
+            self.env.note_dependency(str(file))
+        return self.parse_text_to_nodes("\n".join(f"| {' | '.join(line)} |" for line in lines))
+
+
+def _architecture_and_depth(file: Path) -> tuple[str, int]:
+    architecture, _, depth = file.stem.partition("-")
+    return architecture, int(depth.removesuffix("m"))
+
+
+def _row(file: Path) -> list[str]:
+    scores = Evaluation.from_json(file.read_text(encoding="utf-8")).scores(_architecture_and_depth(file)[0])
+    judged = [score.met for score in scores if score.met is not None]
+    return [f"`{file.stem}`", *(_value(scores, name) for name in COLUMNS.values()), f"{sum(judged)} of {len(judged)}"]
+
+
+def _value(scores: tuple[Score, ...], beginning: str) -> str:
+    value = next(score.value for score in scores if score.name.startswith(beginning))
+    return "undefined" if value is None else f"{value:.4g}"
+
+
+def setup(app: Sphinx) -> ExtensionMetadata:
+    """Add the directive."""
+    app.add_directive("score-summary", ScoreSummary)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
