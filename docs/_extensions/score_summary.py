@@ -26,8 +26,7 @@ COLUMNS = {
     "KS energy": "KS energy",
     "KS cos zenith": "KS cos zenith",
     "delta": "cells: delta",
-    "worst energy bin": "energy bin",
-    "above 100 GeV": "tail above 100 GeV",
+    "worst bin": "energy bin",
     "charge χ²/ndf": "charge by cell",
     "AUC": "classifier",
 }
@@ -43,7 +42,7 @@ class ScoreSummary(SphinxDirective):
         """Make the table."""
         folder = Path(self.env.doc2path(self.env.docname)).parent / self.arguments[0]
         files = sorted(folder.glob("*.json"), key=_architecture_and_depth)
-        head = ["", *COLUMNS, "targets met"]
+        head = ["model", *COLUMNS, "met"]
         lines = [head, ["---", *["--:"] * (len(head) - 1)], *(_row(file) for file in files)]
         for file in files:
             self.env.note_dependency(str(file))
@@ -58,7 +57,8 @@ def _architecture_and_depth(file: Path) -> tuple[str, int]:
 def _row(file: Path) -> list[str]:
     scores = Evaluation.from_json(file.read_text(encoding="utf-8")).scores(_architecture_and_depth(file)[0])
     judged = [score.met for score in scores if score.met is not None]
-    return [f"`{file.stem}`", *(_value(scores, name) for name in COLUMNS.values()), f"{sum(judged)} of {len(judged)}"]
+    values = [_value(scores, name) for name in COLUMNS.values()]
+    return [file.stem.replace("-", " "), *values, f"{sum(judged)}/{len(judged)}"]
 
 
 def _value(scores: tuple[Score, ...], beginning: str) -> str:
