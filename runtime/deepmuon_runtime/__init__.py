@@ -1,5 +1,7 @@
 """Samples cosmic-ray muons from small ONNX generators."""
 
+import os
+
 from deepmuon_runtime.check import Report, check_file
 from deepmuon_runtime.errors import DeepMuonError, FailedError, RefusedError
 from deepmuon_runtime.generator import Generator
@@ -29,3 +31,7 @@ __all__ = [
     "read_muons",
     "write_muons",
 ]
+
+# ONNX Runtime reads it once, when it is first imported, which no module here does before this one: no identifier is
+# stored and nothing is sent. Whoever wants that sets it to 0.
+os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")

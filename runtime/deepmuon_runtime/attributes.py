@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.latent import LARGEST_SEED
-from deepmuon_runtime.model import Model
+from deepmuon_runtime.model import Model, is_name
 from deepmuon_runtime.shard import Shard
 
 __all__ = ["attribute_defects", "is_generated", "sound_attributes"]
@@ -47,7 +47,7 @@ def _is_shard(value: Any) -> bool:
 
 
 TEXT = _Rule(lambda x: isinstance(x, str) and x != "", "a text")
-NAME = _Rule(lambda x: isinstance(x, str) and x != "" and x.isprintable(), "a name")
+NAME = _Rule(lambda x: isinstance(x, str) and is_name(x), "a name")
 TEXTS = _Rule(lambda x: isinstance(x, list) and all(isinstance(line, str) for line in x), "a list of texts")
 WHOLE = _Rule(_is_whole, "a whole number from 0 on")
 NOT_NEGATIVE = _Rule(lambda x: _is_number(x) and x >= 0, "a finite number from 0 on")

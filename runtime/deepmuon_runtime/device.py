@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import warnings
 from contextlib import redirect_stdout
 from importlib.metadata import PackageNotFoundError, distribution
@@ -51,6 +52,8 @@ def open_session(content: bytes, name: str, device: str) -> tuple[onnxruntime.In
         raise RefusedError(f"no device {device!r}: there are {', '.join(DEVICES)}")
     _warn_of_two_runtimes()
     onnxruntime.set_default_logger_severity(4)  # what matters is raised
+    if os.environ.get("ORT_DISABLE_TELEMETRY") == "1" and hasattr(onnxruntime, "disable_telemetry_events"):
+        onnxruntime.disable_telemetry_events()  # where the program imported ONNX Runtime before this package
     has_cuda = CUDA_PROVIDER in onnxruntime.get_available_providers()
     if device == "cuda" and not has_cuda:
         raise RefusedError(

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import FailedError, RefusedError
 from deepmuon_runtime.latent import checked_seed, fill_latents, new_seed
-from deepmuon_runtime.model import Model
+from deepmuon_runtime.model import LATENTS_PER_MUON, Model
 from deepmuon_runtime.muon_file import BYTES_PER_MUON, MuonWriter, check_output
 from deepmuon_runtime.muons import MU_PLUS, Muons
 from deepmuon_runtime.ordered_map import ordered_map
@@ -41,7 +41,7 @@ LARGEST_NUMBER = 2**53
 
 # Muons of one run of the network, about: what it works on stays in a CPU's cache; a GPU wants much at once.
 BLOCK = {"cpu": 1 << 14, "cuda": 1 << 18}
-CHUNK_BLOCKS = {"cpu": 8, "cuda": 1}  # blocks of one task of a thread, and of one write
+PIECE = {"cpu": 1 << 17, "cuda": 1 << 18}  # muons of one task of a thread, and of one write, in whole blocks
 LARGEST_MODEL = 2**31 - 1  # bytes: the limit of protobuf, and so of an ONNX file without external data
 
 Outputs = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int8]]  # energy, direction, charge
@@ -77,8 +77,7 @@ class Generator:
         self.device = device
         self.threads = threads
         self._session = session
-        # Multiples of 8 draws: a block begins with a whole step of the random number generator.
-        self._block_draws = max(1, -(-BLOCK[device] // (8 * model.muons_per_draw))) * 8
+        self._block_draws = _block_draws(model, device)
         self._own = threading.local()  # each thread's memory for its runs
 
     @classmethod
@@ -287,13 +286,14 @@ class Generator:
             "model_sha256": model.sha256,
             "architecture": model.architecture,
             "device": self.device,
-            "command_line": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
+            "command_line": _command_line(),
             **{name: rate for name, rate in rates.items() if rate is not None},
         }
 
     def _parts(self, numbers: range) -> Iterator[range]:
         """Cut the numbers of muons at multiples of many blocks; the first part makes a file's chunks: no small one."""
-        size = CHUNK_BLOCKS[self.device] * self._block_draws * self.model.muons_per_draw
+        block = self._block_draws * self.model.muons_per_draw
+        size = -(-PIECE[self.device] // block) * block
         first_end = -(-numbers.start // size) * size + size
         edges = chain([numbers.start], range(first_end, numbers.stop, size), [numbers.stop])
         return (range(start, stop) for start, stop in pairwise(edges) if numbers)
@@ -367,6 +367,20 @@ def _read_model(path: Path) -> bytes:
     except (OSError, ValueError) as error:
         reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else str(error)
         raise RefusedError(f"the model {path} can't be read: {reason}") from error
+
+
+def _block_draws(model: Model, device: str) -> int:
+    """Return how many draws make a block: of large ones, which each thread has in memory, as few as one."""
+    size = max(model.muons_per_draw, model.latent_size // LATENTS_PER_MUON)
+    # Multiples of 8 draws where they fit: a block then begins with a whole step of the random number generator.
+    step = 8 if 8 * size <= BLOCK[device] else 1
+    return -(-BLOCK[device] // (step * size)) * step
+
+
+def _command_line() -> str:
+    """Return the command that runs, for a shell; of a name that is no text the bytes are escaped."""
+    program, *arguments = getattr(sys, "argv", None) or [""]  # a program that embeds Python may give none
+    return shlex.join([Path(program).name, *arguments]).encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def _usable_processors() -> int:

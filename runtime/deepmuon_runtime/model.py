@@ -7,13 +7,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from deepmuon_runtime.errors import RefusedError
 
-__all__ = ["CONTRACT_VERSION", "METADATA_PREFIX", "Model"]
+__all__ = ["CONTRACT_VERSION", "LARGEST_DRAW", "LATENTS_PER_MUON", "METADATA_PREFIX", "Model", "is_name"]
 
 CONTRACT_VERSION = 1
 
-LARGEST_DRAW = 1_000_000  # latents or muons: some dozen megabytes for the smallest run of the network
+LARGEST_DRAW = 1 << 17
+"""The most muons of a draw: the smallest run of the network makes as many."""
+
+LATENTS_PER_MUON = 8
+"""For each muon of the largest draw, so many latents are the most of a draw."""
 
 METADATA_PREFIX = "deepmuon."
 """Begins each key of the contract in a model's `metadata_props`."""
@@ -105,18 +111,30 @@ class _Rule(NamedTuple):
     meaning: str
 
 
+def is_name(text: str) -> bool:
+    """Tell whether a text can stand in a line: neither empty nor with a character that can't be printed."""
+    return text != "" and text.isprintable()
+
+
+def _count(largest: int) -> _Rule:
+    return _Rule(int, lambda x: 1 <= x <= largest, f"a whole number from 1 to {largest}")
+
+
+# Muons are float32: a limit beyond it would be infinite, one below its normal numbers 0.
+_LEAST, _MOST = float(np.finfo(np.float32).smallest_normal), float(np.finfo(np.float32).max)
+
+_NAME = _Rule(str, is_name, "a name of printable characters")
 _TEXT = _Rule(str, bool, "a text")
-_COUNT = _Rule(int, lambda x: 1 <= x <= LARGEST_DRAW, f"a whole number from 1 to {LARGEST_DRAW}")
-_POSITIVE = _Rule(float, lambda x: 0 < x < math.inf, "a positive number")
+_POSITIVE = _Rule(float, lambda x: _LEAST <= x <= _MOST, f"a positive number from {_LEAST:.3g} to {_MOST:.3g}")
 _NOT_NEGATIVE = _Rule(float, lambda x: 0 <= x < math.inf, "a number from 0 on")
 
 _REQUIRED = {
     "contract_version": _Rule(int, lambda x: x == CONTRACT_VERSION, f"{CONTRACT_VERSION} for this release"),
-    "architecture": _TEXT,
+    "architecture": _NAME,
     "depth_m": _NOT_NEGATIVE,
-    "medium": _TEXT,
-    "muons_per_draw": _COUNT,
-    "latent_size": _COUNT,
+    "medium": _NAME,
+    "muons_per_draw": _count(LARGEST_DRAW),
+    "latent_size": _count(LARGEST_DRAW * LATENTS_PER_MUON),
     "energy_min_gev": _POSITIVE,
     "energy_max_gev": _POSITIVE,
     "created_by": _TEXT,

@@ -9,6 +9,8 @@ from typing import TypeVar
 
 __all__ = ["ordered_map"]
 
+LARGEST_LEAD = 8  # results: a caller who is as fast as the threads needs no more, however many they are
+
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -25,14 +27,15 @@ def ordered_map(
     items
         Taken one by one as they are needed.
     threads
-        How many run side by side. As many results again may wait for the caller, and not more.
+        How many run side by side. As many results again may wait for the caller, and 8 at most.
     """
     pending: deque[Future[Result]] = deque()
+    most = threads + min(threads, LARGEST_LEAD)
     pool = ThreadPoolExecutor(threads, thread_name_prefix="muons")
     try:
         for item in items:
             pending.append(pool.submit(function, item))
-            if len(pending) > 2 * threads:
+            if len(pending) > most:
                 yield pending.popleft().result()
         while pending:
             yield pending.popleft().result()

@@ -47,21 +47,29 @@ def test_a_model_that_lacks_a_key_is_refused(tmp_path, key):
     [
         ("contract_version", "2", "1 for this release"),
         ("contract_version", "one", "1 for this release"),
-        ("architecture", "", "a text"),
+        ("created_by", "", "a text"),
+        ("architecture", "", "a name"),
+        ("architecture", "q\x1b[2J", "a name"),
+        ("medium", "G4\nWATER", "a name"),
+        ("medium", "G4\0WATER", "a name"),
         ("depth_m", "-1", "a number from 0 on"),
         ("depth_m", "nan", "a number from 0 on"),
-        ("muons_per_draw", "0", "a whole number from 1 to 1000000"),
-        ("muons_per_draw", "1.5", "a whole number from 1 to 1000000"),
-        ("latent_size", "1000001", "a whole number from 1 to 1000000"),
+        ("muons_per_draw", "0", "a whole number from 1 to 131072"),
+        ("muons_per_draw", "1.5", "a whole number from 1 to 131072"),
+        ("muons_per_draw", "131073", "a whole number from 1 to 131072"),
+        ("latent_size", "1048577", "a whole number from 1 to 1048576"),
         ("energy_min_gev", "0", "a positive number"),
+        ("energy_min_gev", "1e-60", "a positive number from 1.18e-38"),
         ("energy_max_gev", "inf", "a positive number"),
+        ("energy_max_gev", "1e300", "a positive number from 1.18e-38 to 3.4e+38"),
         ("rate_hz_per_m2", "-3", "a positive number"),
+        ("rate_hz_per_m2", "1e-310", "a positive number from 1.18e-38"),
         ("rate_uncertainty_hz_per_m2", "unknown", "a number from 0 on"),
     ],
 )
 def test_a_model_with_an_impossible_value_is_refused(tmp_path, key, value, meaning):
     message = refusal(tmp_path, tiny_model(metadata={key: value}))
-    assert f"deepmuon.{key} is '{value}', and should be {meaning}" in message
+    assert f"deepmuon.{key} is {value!r}, and should be {meaning}" in message
 
 
 def test_an_empty_range_of_energy_is_refused(tmp_path):

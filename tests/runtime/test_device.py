@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import onnxruntime
@@ -61,3 +63,11 @@ def test_two_builds_of_onnx_runtime_side_by_side_bring_a_warning(
         metadata.write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.20.0\n")
     with pytest.warns(UserWarning, match=f"cannot work side by side.*{INSTALL}"):
         Generator.open(file=model_file, device="cpu")
+
+
+def test_onnx_runtime_keeps_no_identifier_and_sends_nothing(model_file):
+    """Its newer releases would store one in the home folder, and say so where they can't."""
+    program = f"from deepmuon_runtime import Generator; Generator.open(file={str(model_file)!r}).sample(10)"
+    environment = {"HOME": str(model_file / "nowhere"), "OMP_NUM_THREADS": "1"}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import hashlib
+import sys
 import threading
 from contextlib import closing
 from pathlib import Path
@@ -18,6 +19,7 @@ from deepmuon_runtime import (
     Muons,
     RefusedError,
     Shard,
+    check_file,
     read_attributes,
     read_muons,
 )
@@ -141,6 +143,15 @@ def test_other_seeds_give_other_muons(generator):
     assert not np.array_equal(a.kinetic_energy, b.kinetic_energy)
 
 
+def test_a_draw_may_be_larger_than_a_block(tmp_path):
+    """Blocks are then of one draw, which begins anywhere among the words of the stream."""
+    generator = opened(tmp_path, tiny_model(20_001))
+    l0 = latents(5, 0, 8, 4 * 20_001).reshape(-1, 4)[:, 0].astype(float)
+    many = generator.sample(8 * 20_001, seed=5)
+    np.testing.assert_allclose(many.kinetic_energy, np.exp(3 * l0), rtol=1e-5)
+    assert are_equal(generator.sample(30_000, seed=5, first=50_000), many[50_000:80_000])
+
+
 def test_without_a_seed_no_two_samples_are_equal(generator):
     assert not are_equal(generator.sample(100), generator.sample(100))
 
@@ -168,6 +179,26 @@ def test_a_file_says_what_its_muons_are(model_file, tmp_path):
         "live_time_s_m2": 20.0,
         "remark": "for a test",
     }
+
+
+@pytest.mark.parametrize(
+    ("argv", "command_line"),
+    [
+        (["/bin/gen", "-o", "bad-\udcff.h5"], r"gen -o 'bad-\udcff.h5'"),
+        (["/bin/gen", "-o", "é.h5"], "gen -o 'é.h5'"),
+        ([], "''"),
+        (None, "''"),
+    ],
+)
+def test_whatever_the_command_line_is_a_file_records_it(model_file, tmp_path, monkeypatch, argv, command_line):
+    """One that is no text, or none, as in a program that embeds Python."""
+    if argv is None:
+        monkeypatch.delattr(sys, "argv")
+    else:
+        monkeypatch.setattr(sys, "argv", argv)
+    Generator.open(file=model_file).write(tmp_path / "muons.h5", 10)
+    assert read_attributes(tmp_path / "muons.h5")["command_line"] == command_line
+    assert not check_file(tmp_path / "muons.h5").defects
 
 
 def test_a_model_without_a_rate_gives_files_without_live_time(tmp_path):

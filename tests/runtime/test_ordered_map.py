@@ -23,11 +23,12 @@ def test_as_many_run_side_by_side_as_there_are_threads():
     assert len(list(ordered_map(lambda _: together.wait(), range(3), 3))) == 3
 
 
-def test_no_more_is_taken_than_the_caller_needs_soon():
+@pytest.mark.parametrize(("threads", "most"), [(2, 4), (64, 72)])
+def test_no_more_is_taken_than_the_caller_needs_soon(threads, most):
     items = iter(range(1000))
-    with closing(ordered_map(lambda item: item, items, 2)) as results:
+    with closing(ordered_map(lambda item: item, items, threads)) as results:
         assert [next(results) for _ in range(10)] == list(range(10))
-        assert next(items) <= 10 + 2 * 2
+        assert next(items) <= 10 + most
 
 
 def test_an_error_comes_in_its_turn_and_ends_the_rest():

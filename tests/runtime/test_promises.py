@@ -53,9 +53,9 @@ def single(model, tmp_path_factory) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("threads", [1, 2, 3])
-@pytest.mark.parametrize("blocks", [1, 3, 8])
-def test_a_file_is_the_same_for_any_threads_and_chunks(model, single, tmp_path, monkeypatch, threads, blocks):
-    monkeypatch.setitem(generator_module.CHUNK_BLOCKS, "cpu", blocks)
+@pytest.mark.parametrize("piece", [1, 50_000, 1 << 17])
+def test_a_file_is_the_same_for_any_threads_and_pieces(model, single, tmp_path, monkeypatch, threads, piece):
+    monkeypatch.setitem(generator_module.PIECE, "cpu", piece)
     Generator.open(file=model, threads=threads).write(tmp_path / "muons.h5", N, SEED)
     assert contents(tmp_path / "muons.h5") == single
 
