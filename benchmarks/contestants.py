@@ -22,6 +22,7 @@ Commands = Callable[[int, int, Path], list[list[str]]]
 """From a count, a seed and an empty folder to the commands that are run side by side."""
 
 HERE = Path(__file__).parent
+PIECE = 1 << 17  # muons of one write
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,11 @@ def contestants(folder: Path, cry: Path | None, ecomug: Path | None) -> Iterator
     yield Contestant("NumPy, table of the inverse CDF", per_core(job("inverse-cdf")), 0.1, writes=False)
     yield Contestant("NumPy, accept-reject", per_core(job("accept-reject")), 0.02, writes=False)
     yield Contestant("limit: random numbers alone", own_job("random"), writes=False)
-    yield Contestant("limit: writing alone", own_job("write"))
+    made = folder / "made"
+    made.mkdir()
+    (command,) = deepmuon_gen("--depth", "0")(PIECE, 1, made)
+    subprocess.run(command, check=True)
+    yield Contestant("limit: writing alone", own_job("write", str(made / "muons.h5")))
     yield Contestant("transformer", deepmuon_gen("--depth", "0", "--architecture", "transformer"), 0.1)
     if find_spec("deepmuon_training"):
         model = folder / "paper_size.onnx"
@@ -85,11 +90,11 @@ def deepmuon_gen(*model: str) -> Commands:
     return commands
 
 
-def own_job(name: str) -> Commands:
+def own_job(*names: str) -> Commands:
     """Return the commands of one process that uses all cores itself."""
 
     def commands(count: int, seed: int, folder: Path) -> list[list[str]]:
-        return [[*job(name), str(count), str(seed), str(folder / "muons")]]
+        return [[*job(*names), str(count), str(seed), str(folder / "muons")]]
 
     return commands
 
@@ -108,6 +113,6 @@ def per_core(program: list[str]) -> Commands:
     return commands
 
 
-def job(name: str) -> list[str]:
-    """Return the command of a job, without its arguments."""
-    return [sys.executable, str(HERE / "job.py"), name]
+def job(*names: str) -> list[str]:
+    """Return the command of a job and the file that it takes, if any, without COUNT SEED OUT."""
+    return [sys.executable, str(HERE / "job.py"), *names]

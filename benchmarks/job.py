@@ -1,6 +1,6 @@
-"""One process of the benchmark that is no deepmuon-gen: python benchmarks/job.py NAME COUNT SEED OUT.
+"""One process of the benchmark that is no deepmuon-gen: python benchmarks/job.py NAME [FILE] COUNT SEED OUT.
 
-The arguments after NAME are those of the drivers of other generators. OUT is "-" where nothing is written.
+The last three arguments are those of the drivers of other generators; FILE, of muons, is for the job that writes.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from deepmuon_runtime import Generator
+from deepmuon_runtime import Generator, read_muons
 from deepmuon_runtime.latent import fill_latents
 from deepmuon_runtime.muon_file import COLUMNS
 from deepmuon_runtime.ordered_map import ordered_map
@@ -42,31 +42,31 @@ def random_numbers(count: int, seed: int, out: str) -> None:
         pass
 
 
-def write(count: int, seed: int, out: str) -> None:
-    """Write the bytes of so many muons, the same ones again and again, and flush them to the disk."""
-    muons = Generator.open(0).sample(min(count, PIECE), seed)
+def write(made: str, count: int, seed: int, out: str) -> None:
+    """Write the bytes of so many muons, those of a file again and again, and flush them to the disk."""
+    muons = read_muons(made)
     with h5py.File(out, "x") as file:
         columns = {name: file.create_dataset(name, (count,), dtype) for name, (dtype, _) in COLUMNS.items()}
-        for first in range(0, count, PIECE):
-            end = min(first + PIECE, count)
+        for first in range(0, count, len(muons)):
+            end = min(first + len(muons), count)
             for name, column in columns.items():
                 column[first:end] = getattr(muons, name)[: end - first]
     with open(out, "rb") as file:
         os.fsync(file.fileno())
 
 
-def by(sampler: Callable[[np.random.Generator], list[NDArray[Any]]]) -> Callable[[int, int, str], None]:
+def by(sampler: Callable[[np.random.Generator, int], list[NDArray[Any]]]) -> Callable[[int, int, str], None]:
     """Return a job that samples by hand and lets each piece go."""
 
     def job(count: int, seed: int, out: str) -> None:
         random = np.random.default_rng(seed)
-        for _ in range(0, count, by_hand.PIECE):
-            sampler(random)
+        for first in range(0, count, by_hand.PIECE):
+            sampler(random, min(by_hand.PIECE, count - first))
 
     return job
 
 
-JOBS: dict[str, Callable[[int, int, str], None]] = {
+JOBS: dict[str, Callable[..., None]] = {
     "library": library,
     "random": random_numbers,
     "write": write,
@@ -77,4 +77,5 @@ JOBS: dict[str, Callable[[int, int, str], None]] = {
 
 
 if __name__ == "__main__":
-    JOBS[sys.argv[1]](int(sys.argv[2]), int(sys.argv[3]), sys.argv[4])
+    name, *file, count, seed, out = sys.argv[1:]
+    JOBS[name](*file, int(count), int(seed), out)

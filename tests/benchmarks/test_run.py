@@ -57,20 +57,54 @@ def test_a_program_that_fails_ends_the_benchmark_and_is_named(driver: Path):
     assert done.stderr.startswith(f"this failed: {driver} 1 ")
 
 
-@pytest.fixture(scope="module")
-def by_hand():
+@pytest.fixture(scope="module", autouse=True)
+def modules():
     sys.path.insert(0, str(RUN.parent))
+    yield
+    sys.path.remove(str(RUN.parent))
+
+
+@pytest.fixture(scope="module")
+def by_hand(modules):
     import by_hand
 
-    yield by_hand
-    sys.path.remove(str(RUN.parent))
+    return by_hand
+
+
+def test_a_sampler_by_hand_makes_as_many_muons_as_are_reported(by_hand):
+    from job import by
+
+    made = []
+
+    def sampler(random: np.random.Generator, n: int) -> list[np.ndarray]:
+        made.append([len(column) for column in by_hand.inverse_cdf(random, n)])
+        assert [len(column) for column in by_hand.accept_reject(random, n)] == made[-1]
+        return []
+
+    by(sampler)(by_hand.PIECE + 100, 1, "-")
+    assert made == [[by_hand.PIECE] * 5, [100] * 5]
+
+
+def test_the_job_that_writes_makes_no_muons_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    import h5py
+    import job
+
+    from deepmuon_runtime import Generator
+
+    Generator.open(0).write(tmp_path / "made.h5", 1000, seed=1)
+    monkeypatch.setattr(job, "Generator", None)
+    job.write(str(tmp_path / "made.h5"), 2500, 1, str(tmp_path / "out"))
+    with h5py.File(tmp_path / "made.h5") as made, h5py.File(tmp_path / "out") as out:
+        for name in out:
+            column = made["muons"][name][:]
+            assert np.array_equal(out[name][:], np.concatenate([column, column, column[:500]]))
 
 
 def test_both_samplers_by_hand_sample_the_same_flux(by_hand):
     """Kolmogorov-Smirnov at 1e-6 false alarms each: 2.7 sqrt(2 / n)."""
     random = np.random.default_rng(1)
     n = by_hand.PIECE
-    for a, b in zip(by_hand.accept_reject(random), by_hand.inverse_cdf(random), strict=True):
+    for a, b in zip(by_hand.accept_reject(random, n), by_hand.inverse_cdf(random, n), strict=True):
         both = np.concatenate([a, b])
         distance = np.abs(np.searchsorted(np.sort(a), both) - np.searchsorted(np.sort(b), both)).max() / n
         assert distance < 2.7 * np.sqrt(2 / n)
@@ -80,6 +114,6 @@ def test_the_samplers_by_hand_sample_the_flux_that_is_published(by_hand):
     """Means of log E and cos zenith against EcoMug's formula as deepmuon_training has it, at 5 standard deviations."""
     flux = pytest.importorskip("deepmuon_training.flux")
     muons = flux.sea_level_muons(by_hand.PIECE, seed=1, minimum=5e-4, maximum=1e3)
-    energy, _, _, w, _ = by_hand.inverse_cdf(np.random.default_rng(1))
+    energy, _, _, w, _ = by_hand.inverse_cdf(np.random.default_rng(1), by_hand.PIECE)
     for a, b in ((np.log(energy), np.log(muons.kinetic_energy)), (w, muons.w)):
         assert abs(a.mean() - b.mean()) < 5 * np.sqrt((a.var() + b.var()) / len(a))
