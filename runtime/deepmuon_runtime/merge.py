@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import os
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 from zlib import crc32
@@ -11,7 +12,7 @@ import numpy as np
 
 from deepmuon_runtime.checksum import unlike
 from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.muon_file import COLUMNS, MuonWriter, read_attributes, read_checksums, read_muons
+from deepmuon_runtime.muon_file import COLUMNS, MuonWriter, read_attributes, read_checksums, read_pieces
 from deepmuon_runtime.shard import WHOLE_RUN
 
 __all__ = ["merge_shards"]
@@ -19,7 +20,7 @@ __all__ = ["merge_shards"]
 PIECE = 1 << 17  # muons copied at once
 
 NEEDED = ("seed", "first", "total", "model_sha256")
-OF_ONE_SHARD = ("count", "first", "shard", "live_time_s_m2", "created", "command_line")
+OF_ONE_SHARD = ("count", "first", "shard", "live_time_s_m2", "created", "created_by", "command_line")
 
 
 class _Part(NamedTuple):
@@ -41,7 +42,8 @@ def merge_shards(
 ) -> int:
     """Join the shards of a run, in the order of their muons, to one file, which is that of the single run.
 
-    Its attributes are too, but for `created`, and `command_line`, which is that of the first shard.
+    Its attributes are too, but for `created`, and for `created_by` and `command_line`, which are those of the first
+    shard: its muons are decided by the model, the seed, their number and the device, on which the shards must agree.
 
     Parameters
     ----------
@@ -62,40 +64,37 @@ def merge_shards(
     ------
     RefusedError
         If a file is no shard or damaged, they are not of one run, muons are missing or in two of them, or `output`
-        can't be written.
+        can't be written or is one of them.
     FailedError
         If writing fails, or another process writes `output` meanwhile.
     """
-    parts = sorted((_part(path) for path in _one_by_one(paths, progress)), key=lambda part: (part.first, part.end))
+    parts = []
+    for path in paths:
+        progress(0)
+        parts.append(_part(Path(path)))
     if not parts:
         raise RefusedError("there are no shards to be merged")
+    parts.sort(key=lambda part: (part.first, part.end))
     for part in parts[1:]:
         _check_same_run(parts[0], part)
+    _check_apart(parts, output)
     total = parts[0].attributes["total"]
     _check_complete(parts, total)
     described = {name: value for name, value in parts[0].attributes.items() if name != "live_time_s_m2"}
     described |= {"shard": str(WHOLE_RUN), "first": 0, "seed": np.uint64(described["seed"])}
     with MuonWriter(output, described, overwrite) as writer:
         if virtual:
-            writer.refer(_one_by_one([part.path for part in parts], progress))
+            writer.refer([part.path for part in parts], progress)
         else:
             for part in parts:
                 _copy(part, writer, progress)
     return int(total)
 
 
-def _one_by_one(paths: Iterable[str | Path], progress: Callable[[int], object]) -> Iterator[Path]:
-    for path in paths:
-        progress(0)
-        yield Path(path)
-
-
 def _copy(part: _Part, writer: MuonWriter, progress: Callable[[int], object]) -> None:
     """Copy the muons of a shard, unless they are not those that were written to it."""
     found = dict.fromkeys(COLUMNS, 0)
-    count = part.end - part.first
-    for first in range(0, count, PIECE):
-        muons = read_muons(part.path, first, min(PIECE, count - first))
+    for muons in read_pieces(part.path, PIECE):
         found = {name: crc32(getattr(muons, name).data, so_far) for name, so_far in found.items()}
         writer.append(muons)
         progress(len(muons))
@@ -123,6 +122,13 @@ def _check_same_run(part: _Part, other: _Part) -> None:
             raise RefusedError(
                 f"{part.path} and {other.path} are of different runs: their {name} is {one!r} and {two!r}"
             )
+
+
+def _check_apart(parts: Sequence[_Part], output: str | Path) -> None:
+    """Refuse to replace a shard, whose muons a virtual file would look for in itself."""
+    for part in parts:
+        if os.path.exists(output) and os.path.samefile(part.path, output):
+            raise RefusedError(f"{output} is the shard {part.path}: choose another name for the output")
 
 
 def _check_complete(parts: Sequence[_Part], total: int) -> None:

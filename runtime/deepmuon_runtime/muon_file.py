@@ -56,6 +56,7 @@ __all__ = [
     "read_attributes",
     "read_checksums",
     "read_muons",
+    "read_pieces",
     "reason",
     "write_muons",
 ]
@@ -193,10 +194,17 @@ class MuonWriter:
         with self._failures():
             self._in_thread(self._append, muons)
 
-    def refer(self, paths: Iterable[str | Path]) -> None:
+    def refer(self, paths: Iterable[str | Path], progress: Callable[[int], object] = lambda _: None) -> None:
         """Take all muons from other muon files, which keep them, instead of `append`.
 
         The file finds them by their paths relative to its folder.
+
+        Parameters
+        ----------
+        paths
+            The files, in the order of their muons.
+        progress
+            Called with 0 again and again, from another thread.
 
         Raises
         ------
@@ -206,7 +214,7 @@ class MuonWriter:
             As for `append`.
         """
         with self._failures():
-            self._in_thread(self._refer, paths)
+            self._in_thread(self._refer, paths, progress)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -249,8 +257,13 @@ class MuonWriter:
         for name, (dtype, _) in COLUMNS.items():
             self._columns[name] = group.create_dataset(name, shape=(0,), maxshape=(None,), chunks=(chunk,), dtype=dtype)
 
-    def _refer(self, paths: Iterable[str | Path]) -> None:
-        parts = [part for part in map(self._part, paths) if part.length]
+    def _refer(self, paths: Iterable[str | Path], progress: Callable[[int], object]) -> None:
+        parts = []
+        for path in paths:
+            progress(0)
+            part = self._part(path)
+            if part.length:
+                parts.append(part)
         if not parts:
             return
         ends = np.cumsum([part.length for part in parts]).tolist()
@@ -260,6 +273,7 @@ class MuonWriter:
                 Source(part.path, f"muons/{name}", end - part.length, end)
                 for part, end in zip(parts, ends, strict=True)
             ]
+            progress(0)
             self._columns[name] = create_virtual_column(group, name, dtype, sources)
             self._checksums[name] = joined_crc32((part.checksums[name], part.length * dtype.itemsize) for part in parts)
         self.count = ends[-1]
@@ -314,14 +328,17 @@ class MuonWriter:
 
     def _discard(self) -> None:
         """Let go of the temporary file, and of its temporary name."""
-        self._in_thread(self._close)
-        self._thread.shutdown()
-        self._remove()
+        try:
+            self._in_thread(self._close)
+        finally:
+            self._thread.shutdown()
+            self._remove()
 
     def _close(self) -> None:
         for file in (getattr(self, name, None) for name in ("_file", "_flush", "_backing")):
             if file is not None:
-                file.close()
+                with suppress(OSError, RuntimeError):  # what it holds is on the disk already, or thrown away
+                    file.close()
 
 
 def write_muons(path: str | Path, muons: Muons, attributes: Mapping[str, object], overwrite: bool = False) -> None:
@@ -370,6 +387,31 @@ def read_muons(path: str | Path, first: int = 0, count: int | None = None) -> Mu
         if not 0 <= first <= end <= total:
             raise RefusedError(f"{path} holds {total} muons: those from {first} to {end} can't be read")
         return Muons(**{name: _readable(group[name])[first:end] for name in COLUMNS})
+
+
+def read_pieces(path: str | Path, size: int) -> Iterator[Muons]:
+    """Read all muons of a file, piece by piece.
+
+    Parameters
+    ----------
+    path
+        A muon file, format version 1.
+    size
+        How many muons of it are in memory at once.
+
+    Yields
+    ------
+    Muons [size], and fewer at the end.
+
+    Raises
+    ------
+    RefusedError
+        If the file can't be read or is no muon file.
+    """
+    with _opened(path) as group:
+        columns = {name: _readable(group[name]) for name in COLUMNS}
+        for first in range(0, len(group["pdg_id"]), size):
+            yield Muons(**{name: column[first : first + size] for name, column in columns.items()})
 
 
 def read_checksums(path: str | Path) -> dict[str, int]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.muon_file import read_attributes, read_muons
+from deepmuon_runtime.muon_file import read_pieces
 from deepmuon_runtime.muons import Muons
 
 __all__ = ["UNITS", "csv_pieces"]
@@ -42,11 +43,12 @@ def csv_pieces(path: str | Path, *, unit: str = "GeV", header: bool = True) -> I
     """
     if unit not in UNITS:
         raise RefusedError(f"there is no unit {unit!r}: energies are in {' or '.join(UNITS)}")
-    count = int(read_attributes(path)["count"])
+    pieces = read_pieces(path, PIECE)
+    first = next(pieces, Muons.empty(0))
     if header:
         yield f"kinetic_energy_{unit},u,v,w,pdg_id\n"
-    for first in range(0, count, PIECE):
-        yield _lines(read_muons(path, first, min(PIECE, count - first)), UNITS[unit])
+    for muons in chain([first], pieces):
+        yield _lines(muons, UNITS[unit])
 
 
 def _lines(muons: Muons, factor: float) -> str:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import errno
 import os
+import warnings
 from pathlib import Path
+
+from deepmuon_runtime.damaged import reason
 
 __all__ = ["publish"]
 
@@ -26,13 +29,13 @@ def publish(partial: Path, target: Path, overwrite: bool) -> None:
     FileExistsError
         If the name is taken (without `overwrite`): of two writers one wins and the other is told.
     OSError
-        If the file system refuses otherwise.
+        If the file system refuses otherwise. Then the name is not given.
     """
     if overwrite:
         os.replace(partial, target)
     else:
         _link(partial, target)
-    _flush_names_to_disk(target.parent)
+    _flush_name_to_disk(target)
 
 
 def _link(source: Path, target: Path) -> None:
@@ -44,13 +47,24 @@ def _link(source: Path, target: Path) -> None:
             raise
         # A file system without hard links (FAT, some network ones): reserve the name, then move over it.
         os.close(os.open(target, os.O_CREAT | os.O_EXCL))
-        os.replace(source, target)
+        try:
+            os.replace(source, target)
+        except BaseException:
+            os.unlink(target)
+            raise
 
 
-def _flush_names_to_disk(folder: Path) -> None:
-    """Make the names in a folder survive a loss of power."""
-    descriptor = os.open(folder, os.O_RDONLY)
+def _flush_name_to_disk(target: Path) -> None:
+    """Make the name of a file survive a loss of power; warn where that fails, for the file is there."""
     try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+        descriptor = os.open(target.parent, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+    except PermissionError:  # a folder that may be written but not read
+        pass
+    except OSError as error:
+        warnings.warn(
+            f"{target} is complete, but a loss of power now might take its name: {reason(error)}", stacklevel=2
+        )

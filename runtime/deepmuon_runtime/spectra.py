@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.muon_file import read_attributes, read_muons
+from deepmuon_runtime.muon_file import read_attributes, read_pieces
 
 __all__ = ["ENERGY_EDGES", "ZENITH_EDGES", "Spectra", "count_spectra"]
 
@@ -69,8 +69,7 @@ def count_spectra(path: str | Path, *, progress: Callable[[int], object] | None 
     if not count:
         raise RefusedError(f"{path} holds no muon")
     by_energy, by_zenith = np.zeros(len(ENERGY_EDGES) - 1, np.int64), np.zeros(len(ZENITH_EDGES) - 1, np.int64)
-    for first in range(0, count, PIECE):
-        muons = read_muons(path, first, min(PIECE, count - first))
+    for muons in read_pieces(path, PIECE):
         by_energy += np.histogram(muons.kinetic_energy, ENERGY_EDGES)[0]
         by_zenith += np.histogram(np.degrees(np.arccos(np.clip(muons.cos_zenith, -1, 1))), ZENITH_EDGES)[0]
         if progress is not None:

@@ -6,6 +6,7 @@ in several folders, and keeps every file open that it has read from. So the numb
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -117,7 +118,7 @@ class VirtualColumn:
 
 
 def _sources(column: h5py.Dataset) -> Iterator[Source]:
-    folder = Path(column.file.filename).parent
+    folder = Path(os.path.realpath(column.file.filename)).parent  # as HDF5 does, links followed
     for mapping in column.virtual_sources():
         first, end = _row(mapping.vspace, len(column))
         if _row(mapping.src_space, end - first) != (0, end - first):

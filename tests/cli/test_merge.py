@@ -116,6 +116,47 @@ def test_an_existing_output_is_replaced_only_where_asked(merge, generator, tmp_p
     assert read_attributes(tmp_path / "all.h5")["count"] == 100
 
 
+def name_of(path: Path) -> str:
+    return path.name
+
+
+def symbolic_link(path: Path) -> str:
+    (path.parent / "links").mkdir()
+    (path.parent / "links" / "link.h5").symlink_to(path)
+    return "links/link.h5"
+
+
+def hard_link(path: Path) -> str:
+    os.link(path, path.parent / "link.h5")
+    return "link.h5"
+
+
+@pytest.mark.parametrize("options", [[], ["--virtual"]], ids=["copied", "virtual"])
+@pytest.mark.parametrize("output", [name_of, symbolic_link, hard_link])
+def test_a_shard_is_never_replaced_by_the_whole(merge, generator, tmp_path, options, output):
+    names = write_shards(generator, tmp_path, "1/2", "2/2", n=100)
+    before = (tmp_path / names[0]).read_bytes()
+    code, out, err = merge(*options, *names, "-o", output(tmp_path / names[0]), "--overwrite")
+    assert (code, out) == (2, "")
+    assert err.endswith(f"is the shard {names[0]}: choose another name for the output\n")
+    assert (tmp_path / names[0]).read_bytes() == before
+
+
+def test_shards_of_two_releases_are_joined_and_those_of_two_devices_are_not(merge, generator, tmp_path):
+    names = write_shards(generator, tmp_path, "1/2", "2/2", n=100)
+    for name, attribute, value in ((names[0], "created_by", "deepmuon-runtime 0.0.1"), (names[1], "device", "cuda")):
+        assert merge(*names, "-o", "all.h5", "--overwrite")[0] == 0
+        with h5py.File(tmp_path / name, "r+") as file:
+            file["muons"].attrs[attribute] = value
+    code, _, err = merge(*names, "-o", "all.h5", "--overwrite")
+    assert (code, "are of different runs: their device is 'cpu' and 'cuda'" in err) == (2, True)
+    with h5py.File(tmp_path / names[1], "r+") as file:
+        file["muons"].attrs["device"] = "cpu"
+    assert merge(*names, "-o", "all.h5", "--overwrite")[0] == 0
+    assert read_attributes(tmp_path / "all.h5")["created_by"] == "deepmuon-runtime 0.0.1"
+    assert check(tmp_path / "all.h5")[0] == 0
+
+
 def make_virtual(merge, generator: Generator, folder: Path, n: int = 1000) -> list[str]:
     """Write three shards in a folder of their own, and a virtual file beside it."""
     (folder / "shards 100%d").mkdir()
@@ -161,6 +202,15 @@ def test_a_virtual_file_and_its_shards_may_be_moved_together(merge, generator, t
     assert check(tmp_path / "there" / "all.h5")[0] == 0
 
 
+def test_a_virtual_file_is_read_through_a_link_in_another_folder(merge, generator, tmp_path):
+    make_virtual(merge, generator, tmp_path)
+    (tmp_path / "elsewhere").mkdir()
+    link = tmp_path / "elsewhere" / "link.h5"
+    link.symlink_to(tmp_path / "all.h5")
+    assert len(read_muons(link)) == 1000
+    assert check(link)[0] == 0
+
+
 def test_a_missing_shard_is_named_and_nobody_gets_its_muons(merge, generator, tmp_path, monkeypatch):
     names = make_virtual(merge, generator, tmp_path)
     elsewhere = tmp_path / "elsewhere"
@@ -169,7 +219,7 @@ def test_a_missing_shard_is_named_and_nobody_gets_its_muons(merge, generator, tm
     monkeypatch.chdir(elsewhere)  # where HDF5 finds it by itself
     code, out = check(tmp_path / "all.h5")
     assert code == 3
-    assert f"defect: the column u can't be read: its source {names[1]} is missing" in out
+    assert f"defect: the column u can't be read: its source {tmp_path.resolve() / names[1]} is missing" in out
     with pytest.raises(RefusedError, match=r"its source .*part-2-of-3.* is missing"):
         read_muons(tmp_path / "all.h5")
     assert len(read_muons(tmp_path / "all.h5", 0, 333)) == 333  # of the first shard

@@ -2,10 +2,12 @@ from __future__ import annotations
 
 import errno
 import os
+import stat
 import subprocess
 import sys
 import textwrap
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from zlib import crc32
 
@@ -24,7 +26,9 @@ from deepmuon_runtime import (
     read_muons,
     write_muons,
 )
-from deepmuon_runtime.muon_file import PARTIAL_SUFFIX, check_output, read_checksums
+from deepmuon_runtime.muon_file import PARTIAL_SUFFIX, check_output, read_checksums, read_pieces
+from deepmuon_runtime.quiet_file import QuietFile
+from deepmuon_runtime.virtual import VirtualColumn
 
 PLANE = {"depth_m": 10.0, "medium": "G4_WATER"}
 COLUMNS = ("kinetic_energy", "u", "v", "w", "pdg_id")
@@ -167,6 +171,90 @@ def test_of_two_writers_one_wins_and_the_other_is_told(tmp_path):
         lose()
     assert len(read_muons(path)) == 3
     assert len(list(tmp_path.iterdir())) == 1
+
+
+def failing(number: int) -> Callable[..., None]:
+    def fail(*arguments: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    return fail
+
+
+def test_a_move_that_fails_where_there_are_no_hard_links_leaves_no_empty_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "link", failing(errno.EPERM))
+    monkeypatch.setattr(os, "replace", failing(errno.EIO))
+    with pytest.raises(FailedError, match="was not written: Input/output error"):
+        write_muons(tmp_path / "muons.h5", some_muons(3), PLANE)
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_folder_that_may_be_written_but_not_read_gets_the_file(tmp_path, monkeypatch):
+    """As root, who may read everything, by a call that fails."""
+    open_it = os.open
+
+    def open_no_folder(path: Path, flags: int, *mode: int) -> int:
+        if os.path.isdir(path):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        return open_it(path, flags, *mode)
+
+    monkeypatch.setattr(os, "open", open_no_folder)
+    write_muons(tmp_path / "muons.h5", some_muons(3), PLANE)
+    assert len(read_muons(tmp_path / "muons.h5")) == 3
+
+
+def test_a_name_that_can_not_be_brought_to_the_disk_is_a_warning_for_the_file_is_there(tmp_path, monkeypatch):
+    flush = os.fsync
+
+    def flush_no_folder(descriptor: int) -> None:
+        if stat.S_ISDIR(os.fstat(descriptor).st_mode):
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        flush(descriptor)
+
+    monkeypatch.setattr(os, "fsync", flush_no_folder)
+    with pytest.warns(UserWarning, match="is complete, but a loss of power now might take its name: Input/output"):
+        write_muons(tmp_path / "muons.h5", some_muons(3), PLANE)
+    assert len(read_muons(tmp_path / "muons.h5")) == 3
+
+
+def test_a_file_that_can_not_be_closed_leaves_nothing(tmp_path, monkeypatch):
+    close = QuietFile.close
+
+    def close_and_fail(file: QuietFile) -> None:
+        close(file)
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr(QuietFile, "close", close_and_fail)
+    write_muons(tmp_path / "muons.h5", some_muons(3), PLANE)
+    assert [path.name for path in tmp_path.iterdir()] == ["muons.h5"]
+    with pytest.raises(ValueError, match="in the body"), MuonWriter(tmp_path / "other.h5", PLANE):
+        raise ValueError("in the body")
+    assert [path.name for path in tmp_path.iterdir()] == ["muons.h5"]
+
+
+def test_the_pieces_of_a_file_are_its_muons(tmp_path):
+    for n, lengths in ((0, []), (10, [4, 4, 2]), (8, [4, 4])):
+        write_muons(tmp_path / f"{n}.h5", some_muons(n), PLANE)
+        pieces = list(read_pieces(tmp_path / f"{n}.h5", 4))
+        assert [len(piece) for piece in pieces] == lengths
+        assert are_equal(Muons.concatenate([*pieces, some_muons(0)]), some_muons(n))
+
+
+def test_the_sources_of_a_virtual_file_are_looked_up_once_for_all_its_pieces(tmp_path, monkeypatch):
+    write_muons(tmp_path / "muons.h5", some_muons(10), PLANE)
+    with MuonWriter(tmp_path / "virtual.h5", PLANE) as writer:
+        signs_of_life = []
+        writer.refer([tmp_path / "muons.h5"], signs_of_life.append)
+    assert signs_of_life == [0] * (1 + len(COLUMNS))
+    looked_up = []
+    initialize = VirtualColumn.__init__
+
+    def count(column: VirtualColumn, *arguments: object) -> None:
+        looked_up.append(column)
+        initialize(column, *arguments)
+
+    monkeypatch.setattr(VirtualColumn, "__init__", count)
+    assert are_equal(Muons.concatenate(list(read_pieces(tmp_path / "virtual.h5", 3))), some_muons(10))
+    assert len(looked_up) == len(COLUMNS)
 
 
 def test_a_folder_that_vanishes_is_a_failure(tmp_path):
