@@ -1,13 +1,16 @@
 """How a command ends: its exit code, and one line that says why.
 
-====  ===========================================================================================
-0     done
-1     failed while running: disk full, the model gave a bad muon, lost a race for the output
-2     refused before anything started: bad arguments, no such depth, bad input, output exists
-3     `deepmuon-check` found a defect
-130   stopped by Ctrl-C
-143   stopped by SIGTERM
-====  ===========================================================================================
+=====  ===========================================================================================
+0      done
+1      failed while running: disk full, the model gave a bad muon, lost a race for the output,
+       stdout not written to its end
+2      refused before anything started: bad arguments, no such depth, bad input, output exists
+3      `deepmuon-check` found a defect
+129    stopped by SIGHUP: the terminal or the connection was closed
+130    stopped by Ctrl-C
+143    stopped by SIGTERM
+128+n  ended by another signal, of number n
+=====  ===========================================================================================
 """
 
 from __future__ import annotations
@@ -16,17 +19,20 @@ import signal
 import sys
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from types import FrameType
 from typing import Any, NoReturn
 
 import click
 
-__all__ = ["DEFECTIVE", "run"]
+from deepmuon_cli.stdout import watched_stdout
+
+__all__ = ["DEFECTIVE", "REFUSED", "SIGNALS", "complain", "run"]
 
 FAILED = 1
 REFUSED = 2
 DEFECTIVE = 3
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 MOMENT = 0.02  # s, after which a signal that got lost comes again
 
@@ -44,13 +50,19 @@ def run(command: click.Command, name: str) -> NoReturn:
     warnings.showwarning = lambda message, *_, **__: _say(f"{name}: warning:", message, "yellow")
     code, reason = _Stopping().outcome(lambda: _outcome(command, name))
     if reason:
-        _say(f"{name}:", reason, "red")
+        complain(name, reason)
     sys.exit(code)
+
+
+def complain(name: str, reason: str) -> None:
+    """Write the line that says why a command does not end with 0."""
+    _say(f"{name}:", reason, "red")
 
 
 def _say(beginning: str, message: object, colour: str) -> None:
     """Write a line to stderr; click leaves the colour out where that is no terminal."""
-    click.echo(f"{click.style(beginning, fg=colour)} {_printable(message)}", err=True)
+    with suppress(OSError):  # a terminal that was closed, a full disk: the exit code has to do
+        click.echo(f"{click.style(beginning, fg=colour)} {_printable(message)}", err=True)
 
 
 def _printable(message: object) -> str:
@@ -99,7 +111,7 @@ class _Stopping:
     def _begin(self) -> None:
         sys.unraisablehook = self._unraisable
         for number in SIGNALS:
-            if signal.getsignal(number) is not signal.SIG_IGN:  # as for a job in the background
+            if signal.getsignal(number) is not signal.SIG_IGN:  # as for a job in the background, or of nohup
                 signal.signal(number, self._stop)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
 
@@ -129,11 +141,14 @@ class _Stopping:
 def _outcome(command: click.Command, name: str) -> tuple[int, str]:
     """Return the exit code, and the reason where there is one."""
     try:
-        code = command.main(prog_name=name, standalone_mode=False)  # that of click.Context.exit, or None
+        with watched_stdout():
+            code = command.main(prog_name=name, standalone_mode=False)  # that of click.Context.exit, or None
     except click.ClickException as error:
         if isinstance(error, click.NoSuchOption) and error.possibilities:
             del error.possibilities[1:]  # after the nearest come distant ones
         return REFUSED, " ".join(error.format_message().split())
+    except OSError as error:  # a folder that vanished at that moment
+        return FAILED, str(error)
     except Exception as error:
         from deepmuon_runtime.errors import FailedError, RefusedError
 

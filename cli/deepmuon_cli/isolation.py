@@ -9,20 +9,24 @@ import os
 import resource
 import signal
 import sys
+from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
 
 import click
 
-from deepmuon_cli.ending import REFUSED, SIGNALS, run
+from deepmuon_cli.ending import REFUSED, SIGNALS, complain, run
 
 __all__ = ["run_isolated", "show_life", "take_time"]
 
 PATIENCE = 10.0  # s of computing
 
+OF_DAMAGE = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL, signal.SIGPROF)
+"""What ends a process that trusts a damaged file; other signals come from outside."""
+
 
 def run_isolated(command: click.Command, name: str) -> NoReturn:
-    """Run a command as `deepmuon_cli.ending.run` does, but a command that is ended by a signal has refused its input.
+    """Run a command as `deepmuon_cli.ending.run` does, but one that crashes or never ends has refused its input.
 
     The command has to call `show_life` from time to time. Call this before any thread starts.
 
@@ -39,7 +43,8 @@ def run_isolated(command: click.Command, name: str) -> NoReturn:
         run(command, name)
 
     def pass_on(number: int, frame: FrameType | None) -> None:
-        os.kill(child, number)
+        with suppress(ProcessLookupError):  # it has just ended
+            os.kill(child, number)
 
     for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
@@ -49,10 +54,14 @@ def run_isolated(command: click.Command, name: str) -> NoReturn:
     code = os.waitstatus_to_exitcode(status)
     if -code in SIGNALS:  # it came when all was done
         code = 128 - code
-    elif code < 0:
+    elif -code in OF_DAMAGE:
         ending = "took no end" if -code == signal.SIGPROF else f"was ended by {signal.Signals(-code).name}"
-        click.echo(f"{name}: a file is damaged so that reading it {ending}", err=True)
+        complain(name, f"a file is damaged so that reading it {ending}")
         code = REFUSED
+    elif code < 0:
+        hint = ", as the system does when memory runs out" if -code == signal.SIGKILL else ""
+        complain(name, f"ended from outside by signal {-code}, {signal.strsignal(-code)}{hint}")
+        code = 128 - code
     sys.exit(code)
 
 

@@ -101,11 +101,18 @@ def test_other_errors_of_destructors_are_still_reported():
     assert "ValueError: bad" in err
 
 
-def test_a_signal_that_is_ignored_from_the_beginning_stays_so():
+@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
+def test_each_signal_that_asks_for_an_end_has_its_exit_code(name, code):
+    assert run_command(f"signal.raise_signal(signal.{name})") == (code, "", f"it: stopped by {name}\n")
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGHUP"])
+def test_a_signal_that_is_ignored_from_the_beginning_stays_so(name):
+    """As Ctrl-C in the background, and SIGHUP under nohup."""
     ignoring = (
-        "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN); os.execv(sys.executable, sys.argv[1:])"
+        f"import os, signal, sys; signal.signal(signal.{name}, signal.SIG_IGN); os.execv(sys.executable, sys.argv[1:])"
     )
-    program = textwrap.dedent(PRELUDE) + "\n@click.command()\ndef command(): os.kill(os.getpid(), signal.SIGINT)"
+    program = textwrap.dedent(PRELUDE) + f"\n@click.command()\ndef command(): os.kill(os.getpid(), signal.{name})"
     done = subprocess.run(
         [sys.executable, "-c", ignoring, sys.executable, "-c", f"{program}\nrun(command, 'it')"], check=False
     )
@@ -115,3 +122,93 @@ def test_a_signal_that_is_ignored_from_the_beginning_stays_so():
 def test_control_characters_of_a_strangers_file_do_not_reach_the_terminal():
     body = "import warnings\nwarnings.warn('a\\n\\x1b')\nraise click.ClickException('\\x1b[2Jµ\\x9b')"
     assert run_command(body) == (2, "", "it: warning: a\\n\\x1b\nit: \\x1b[2Jµ\\x9b\n")
+
+
+@pytest.mark.parametrize("environment", [{}, {"PYTHONUNBUFFERED": "1"}], ids=["buffered", "unbuffered"])
+@pytest.mark.parametrize("number", [1, 100_000], ids=["little", "much"])
+def test_stdout_that_can_not_be_written_is_told_in_one_line(environment, number):
+    program = f"{textwrap.dedent(PRELUDE)}\n@click.command()\ndef command(): print('text' * {number})"
+    inherited = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", f"{program}\nrun(command, 'it')"],
+            env=inherited | environment,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert (done.returncode, done.stderr) == (1, "it: stdout was not written to its end: No space left on device\n")
+
+
+def test_other_errors_of_the_system_are_one_line():
+    assert run_command("open('/missing/file')") == (
+        1,
+        "",
+        "it: [Errno 2] No such file or directory: '/missing/file'\n",
+    )
+
+
+def test_stderr_that_can_not_be_written_leaves_the_exit_code():
+    program = f"{textwrap.dedent(PRELUDE)}\n@click.command()\ndef command(): raise click.ClickException('no')"
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([sys.executable, "-c", f"{program}\nrun(command, 'it')"], stderr=full, check=False)
+    assert done.returncode == 2
+
+
+def isolated(body: str) -> tuple[int, str]:
+    """Run a command with this body as those that may meet damaged files: exit code, stderr."""
+    program = f"""
+        import os, signal
+        import click
+        from deepmuon_cli import isolation
+
+        @click.command()
+        def command():
+            {body}
+
+        isolation.run_isolated(command, "it")
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(program)], capture_output=True, text=True, timeout=300)
+    return done.returncode, done.stderr
+
+
+@pytest.mark.parametrize("name", ["SIGSEGV", "SIGBUS", "SIGABRT", "SIGFPE", "SIGILL"])
+def test_a_crash_is_a_damaged_file(name):
+    assert isolated(f"os.kill(os.getpid(), signal.{name})") == (
+        2,
+        f"it: a file is damaged so that reading it was ended by {name}\n",
+    )
+
+
+def test_a_process_that_is_killed_from_outside_has_met_no_damaged_file():
+    reason = "it: ended from outside by signal 9, Killed, as the system does when memory runs out\n"
+    assert isolated("os.kill(os.getpid(), signal.SIGKILL)") == (137, reason)
+    assert isolated("signal.raise_signal(signal.SIGUSR1)") == (
+        138,
+        "it: ended from outside by signal 10, User defined signal 1\n",
+    )
+
+
+def test_a_signal_after_the_commands_process_has_ended_is_late():
+    """The handler that passes signals on is called when the process is waited for already."""
+    program = """
+        import os, signal, sys
+        import click
+        from deepmuon_cli import isolation
+
+        @click.command()
+        def command():
+            pass
+
+        wait = os.waitpid
+        def wait_and_interrupt(*arguments):
+            done = wait(*arguments)
+            signal.raise_signal(signal.SIGINT)
+            return done
+
+        os.waitpid = wait_and_interrupt
+        isolation.run_isolated(command, "it")
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(program)], capture_output=True, text=True, timeout=300)
+    assert (done.returncode, done.stderr) == (0, "")

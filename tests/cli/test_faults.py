@@ -14,13 +14,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.thorough import TIMES
 from support.tiny_models import RARELY_BAD, tiny_model
 
 from deepmuon_runtime import check_file, read_attributes
 
 COMMAND = Path(sysconfig.get_path("scripts")) / "deepmuon-gen"
 LONGEST = 600  # s, on any machine
-STRIKES = 10  # of each signal
+STRIKES = 10 * TIMES  # of each signal
 MANY = 20_000_000  # muons that take a while
 
 
@@ -67,19 +68,37 @@ def is_ready(process: subprocess.Popen[str]) -> bool:
     return bool(caught >> (signal.SIGTERM - 1) & 1)
 
 
+def struck_at_random_moments(model: Path, folder: Path, number: signal.Signals) -> Iterator[subprocess.Popen[str]]:
+    """Yield runs that got a signal at a moment between their beginning and what was the end of an undisturbed one."""
+    began = time.monotonic()
+    assert ended(start(model, folder)) == (0, "")
+    duration = time.monotonic() - began
+    (folder / "muons.h5").unlink()
+    for delay in np.random.default_rng(number).uniform(0, duration, STRIKES):
+        process = start(model, folder)
+        if number != signal.SIGKILL:
+            wait_until(lambda process=process: is_ready(process))
+        time.sleep(delay)
+        process.send_signal(number)
+        yield process
+
+
+def assert_named_by_the_next_run(left: Path, model: Path) -> None:
+    """Run again where a killed run left a temporary file, and remove that and the output."""
+    code, err = ended(start(model, left.parent, n=10))
+    assert code == 0
+    assert err.startswith("deepmuon-gen: warning: ")
+    assert left.name in err
+    assert err.count("\n") == 1
+    left.unlink()
+    (left.parent / "muons.h5").unlink()
+
+
 def fill_up(folder: Path) -> None:
     """Take all the room that a file system has."""
     with (folder / "filler").open("wb", buffering=0) as filler:
         while filler.write(bytes(1 << 20)):
             pass
-
-
-@pytest.fixture(scope="module")
-def duration(tmp_path_factory, tiny_file) -> float:
-    """Seconds of an undisturbed run on this machine."""
-    started = time.monotonic()
-    assert ended(start(tiny_file, tmp_path_factory.mktemp("undisturbed"))) == (0, "")
-    return time.monotonic() - started
 
 
 @pytest.fixture(scope="module")
@@ -89,19 +108,13 @@ def tiny_file(tmp_path_factory) -> Path:
     return path
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=["SIGTERM", "Ctrl-C"])
-def test_a_run_that_is_stopped_at_a_random_moment_leaves_nothing_or_all(tmp_path, tiny_file, duration, number):
-    """10 moments of each."""
-    codes = []
-    for delay in np.random.default_rng(number).uniform(0, duration, STRIKES):
-        process = start(tiny_file, tmp_path)
-        wait_until(lambda process=process: is_ready(process))
-        time.sleep(delay)
-        process.send_signal(number)
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP], ids=["SIGTERM", "Ctrl-C", "SIGHUP"])
+def test_a_run_that_is_stopped_at_a_random_moment_leaves_nothing_or_all(tmp_path, tiny_file, number):
+    """10 moments of each, and one in the middle of the writing."""
+    output = tmp_path / "muons.h5"
+    for process in struck_at_random_moments(tiny_file, tmp_path, number):
         code, err = ended(process)
-        codes.append(code)
         assert partial_files(tmp_path) == []
-        output = tmp_path / "muons.h5"
         if code == 128 + number:
             assert err == f"deepmuon-gen: stopped by {number.name}\n"
         else:
@@ -110,35 +123,28 @@ def test_a_run_that_is_stopped_at_a_random_moment_leaves_nothing_or_all(tmp_path
         if output.exists():
             assert check_file(output).defects == []
             output.unlink()
-    assert 128 + number in codes
+    process = stopped_while_writing(tiny_file, tmp_path)
+    process.send_signal(number)
+    assert go_on(process) == (128 + number, f"deepmuon-gen: stopped by {number.name}\n")
+    assert list(tmp_path.iterdir()) == []
 
 
-def test_a_run_that_is_killed_at_a_random_moment_leaves_nothing_or_all_under_the_name(tmp_path, tiny_file, duration):
-    """10 moments; and the next run says what it found."""
+def test_a_run_that_is_killed_at_a_random_moment_leaves_nothing_or_all_under_the_name(tmp_path, tiny_file):
+    """10 moments, and one in the middle of the writing; and the next run says what it found."""
     output = tmp_path / "muons.h5"
-    left = 0
-    for delay in np.random.default_rng(9).uniform(0, duration, STRIKES):
-        process = start(tiny_file, tmp_path)
-        time.sleep(delay)
-        process.kill()
+    for process in struck_at_random_moments(tiny_file, tmp_path, signal.SIGKILL):
         ended(process)
         if output.exists():
             assert check_file(output).defects == []
             output.unlink()
         for path in partial_files(tmp_path):
-            left += 1
-            code, err = ended(start(tiny_file, tmp_path, n=10))
-            assert code == 0
-            assert err.startswith("deepmuon-gen: warning: ")
-            assert path.name in err
-            assert err.count("\n") == 1
-            path.unlink()
-            output.unlink()
+            assert_named_by_the_next_run(path, tiny_file)
     process = stopped_while_writing(tiny_file, tmp_path)
     process.kill()
     ended(process)
-    assert len(partial_files(tmp_path)) == 1
     assert not output.exists()
+    (left,) = partial_files(tmp_path)
+    assert_named_by_the_next_run(left, tiny_file)
 
 
 @pytest.fixture
@@ -210,7 +216,7 @@ def test_of_two_runs_the_one_that_comes_second_is_told(tmp_path, tiny_file):
 
 def test_of_runs_at_the_same_time_one_wins(tmp_path, tiny_file):
     """5 races of 3."""
-    for _ in range(5):
+    for _ in range(5 * TIMES):
         processes = [start(tiny_file, tmp_path, "--seed", str(seed)) for seed in range(3)]
         codes = [ended(process)[0] for process in processes]
         winner = codes.index(0)

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.damage import DAMAGES, cut_out, overwrite, repeat, truncate
+from support.thorough import TIMES
 from support.tiny_models import tiny_model
 
 from deepmuon_runtime import Generator, Shard, check_file, list_models
@@ -69,7 +70,7 @@ def models_ran(folder: Path, count: int, seed: int = SEED) -> Counter[int]:
 
 def test_no_damaged_model_ends_the_command_by_a_signal_or_leaves_anything_but_good_muons(tmp_path):
     """280 models."""
-    found = models_ran(tmp_path, 280)
+    found = models_ran(tmp_path, 280 * TIMES)
     assert found.keys() <= {0, 1, 2}
     assert found[0] > 0
     assert found[2] > 100
@@ -87,7 +88,7 @@ def test_no_damaged_shard_ends_the_merge_by_a_signal_or_leaves_anything_but_good
     content = (tmp_path / "2.h5").read_bytes()
     random = np.random.default_rng(SEED)
     lines = []
-    for number in range(100):
+    for number in range(100 * TIMES):
         (tmp_path / f"damaged-{number}.h5").write_bytes(DAMAGE_OF_BYTES[number % 4](content, random))
         shards = [f"{tmp_path}/1.h5", f"{tmp_path}/damaged-{number}.h5"]
         lines.append([*options, *shards, "-o", f"{tmp_path}/out-{number}.h5"])

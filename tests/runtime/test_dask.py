@@ -19,6 +19,7 @@ from dask.array import Array
 from deepmuon_runtime.dask import muon_arrays
 
 COLUMNS = ("kinetic_energy", "u", "v", "w", "pdg_id")
+LONGEST = 300  # s, on any machine
 
 
 def computed(arrays: dict[str, Array], **how: str) -> Muons:
@@ -94,5 +95,7 @@ def test_a_killed_worker_changes_nothing(model_file, single, tmp_path: Path):
         distributed.wait(chunks, return_when="FIRST_COMPLETED")
         killed = next(worker for workers in client.who_has(chunks).values() for worker in workers)
         os.kill(client.run(os.getpid)[killed], signal.SIGKILL)
-        assert are_equal(Muons(*client.gather(client.compute(columns))), single)
+        made = client.compute(columns)
+        distributed.wait(made, timeout=LONGEST)
+        assert are_equal(Muons(*client.gather(made)), single)
         assert killed not in client.scheduler_info()["workers"]
