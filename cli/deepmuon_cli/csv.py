@@ -40,6 +40,7 @@ def csv(file: Path, output: Path, units: str, no_header: bool, overwrite: bool) 
     Columns: kinetic energy in GeV or MeV; direction of motion u, v, w, a unit vector, z up; pdg_id, 13 for mu- and -13
     for mu+. Nine digits keep every number as it is in the file.
     """  # noqa: D301 - click looks for the character \b
+    from deepmuon_runtime.errors import RefusedError
     from deepmuon_runtime.muon_text import csv_pieces
     from deepmuon_runtime.whole_file import whole_file
 
@@ -47,6 +48,8 @@ def csv(file: Path, output: Path, units: str, no_header: bool, overwrite: bool) 
     if str(output) == "-":
         _print(pieces)
         return
+    if output.exists() and file.exists() and output.samefile(file):
+        raise RefusedError(f"{output} is the muon file itself, which the text would replace: give another name")
     with whole_file(output, overwrite=overwrite) as text:
         for piece in pieces:
             text.write(piece)

@@ -113,7 +113,7 @@ def gen(
 
     A seed gives the same muons for any -n and --threads: a shorter run is the beginning of a longer one. The
     output appears under its name only when it is complete. Exit codes: 0 done, 1 failed while running,
-    2 refused before anything was written, 130 stopped by Ctrl-C, 143 stopped by SIGTERM.
+    2 refused before anything was written, 129, 130 and 143 stopped by SIGHUP, Ctrl-C and SIGTERM.
     """  # noqa: D301 - click looks for the character \b
     started = time.perf_counter()
     if list_only:

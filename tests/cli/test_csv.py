@@ -104,3 +104,13 @@ def test_an_existing_output_is_replaced_only_where_asked(csv, tmp_path):
     assert (tmp_path / "muons.csv").read_text() == "precious"
     assert csv("muons.h5", "-o", "muons.csv", "--overwrite") == (0, "", "")
     assert (tmp_path / "muons.csv").read_text().count("\n") == MUONS + 1
+
+
+def test_the_muon_file_itself_is_never_replaced(csv, tmp_path):
+    before = (tmp_path / "muons.h5").read_bytes()
+    (tmp_path / "link.h5").symlink_to("muons.h5")
+    for output in ("muons.h5", "link.h5"):
+        code, out, err = csv("muons.h5", "-o", output, "--overwrite")
+        assert (code, out) == (2, "")
+        assert "is the muon file itself" in err
+    assert (tmp_path / "muons.h5").read_bytes() == before
