@@ -16,29 +16,29 @@ import numpy as np
 import torch
 
 from deepmuon_runtime import Generator, Muons, read_muons
-from deepmuon_training.charge import fit_charge
+from deepmuon_training.architectures import Settings, fit_generator
 from deepmuon_training.evaluate import Evaluation, evaluate
-from deepmuon_training.export import Exportable, Training, export
 from deepmuon_training.fit import Schedule
+from deepmuon_training.fitted import export_fitted
 from deepmuon_training.histogram_scores import ENERGY_EDGES
-from deepmuon_training.quantile_fit import fit_quantile
-from deepmuon_training.quantile_tables import tabulate
-from deepmuon_training.sample import MINIMUM_ENERGY, Sample, read_sample
-from deepmuon_training.transformer_fit import TransformerSettings, fit_transformer
-from deepmuon_training.transformer_model import ChargeTable, TransformerModel, radius_table
+from deepmuon_training.quantile_fit import QuantileSchedules
+from deepmuon_training.sample import Sample, read_sample
+from deepmuon_training.transformer_fit import TransformerSettings
 
 SMALL = 6_000
 REPETITIONS = 10
 GENERATED = 2_000_000
 SEED = 1
-FEW_STEPS = TransformerSettings(
-    batch=8192,
-    schedule=Schedule(
-        steps=3000, learning_rate=1e-3, weight_decay=0.01, averaging=0.998, validate_every=100, patience=16
+SETTINGS: dict[str, Settings] = {
+    "quantile": QuantileSchedules(),
+    "transformer": TransformerSettings(
+        batch=8192,
+        schedule=Schedule(
+            steps=3000, learning_rate=1e-3, weight_decay=0.01, averaging=0.998, validate_every=100, patience=16
+        ),
     ),
-)
-"""Batches no larger than the sample: the released models' settings would show the same 5,700 muons six times a step."""
-BINS_PER_DECADE = 5
+}
+"""The transformer's batches are about as large as the sample: those of the released models would show it six times."""
 LEAST_SHARE = 0.01
 """Energy bins with a smaller share of the muons are not judged."""
 
@@ -72,33 +72,21 @@ def _scores(name: str, sample: Sample, k: int, truth: Muons, work: Path) -> dict
     return found
 
 
-def generated(exportable: Exportable, sample: Sample, path: Path) -> tuple[Muons, int]:
-    """Export, and sample with the runtime as a user would."""
-    export(exportable, Training(sample, SEED), path)
-    generator = Generator.open(file=path, device="cpu")
-    return generator.sample(GENERATED, seed=SEED), generator.model.muons_per_draw
+def generated(architecture: str) -> Callable[[Sample, Path], tuple[Muons, int]]:
+    """Return what fits a generator to a sample, and draws from its ONNX file as a user would."""
 
+    def muons(sample: Sample, stem: Path) -> tuple[Muons, int]:
+        path = stem.with_suffix(".onnx")
+        if not path.exists():
+            checkpoints = stem.with_suffix(".checkpoints")
+            checkpoints.mkdir(exist_ok=True)
+            settings = SETTINGS[architecture]
+            fitted = fit_generator(sample, architecture, seed=SEED, settings=settings, checkpoint_folder=checkpoints)
+            export_fitted(fitted, path)
+        generator = Generator.open(file=path, device="cpu")
+        return generator.sample(GENERATED, seed=SEED), generator.model.muons_per_draw
 
-def of_quantile(sample: Sample, stem: Path) -> tuple[Muons, int]:
-    """Muons of a `quantile` generator."""
-    tables = tabulate(fit_quantile(sample.muons, seed=SEED, progress=False))
-    return generated(tables, sample, stem.with_suffix(".onnx"))
-
-
-def of_transformer(sample: Sample, stem: Path) -> tuple[Muons, int]:
-    """Muons of a `transformer` generator."""
-    network, transform = fit_transformer(
-        sample.muons, seed=SEED, settings=FEW_STEPS, checkpoint=stem.with_suffix(".pt"), progress=False
-    )
-    charge = fit_charge(sample.muons, transform, seed=SEED, progress=False)
-    model = TransformerModel.stored(
-        network,
-        transform=transform,
-        angle=radius_table(network, sample.muons, seed=SEED),
-        charge=ChargeTable.of(charge, transform),
-        energy_range=(MINIMUM_ENERGY, float(sample.muons.kinetic_energy.max())),
-    )
-    return generated(model, sample, stem.with_suffix(".onnx"))
+    return muons
 
 
 def of_histogram(sample: Sample, stem: Path) -> tuple[Muons, int]:
@@ -117,8 +105,8 @@ def of_histogram(sample: Sample, stem: Path) -> tuple[Muons, int]:
 
 
 KINDS: dict[str, Callable[[Sample, Path], tuple[Muons, int]]] = {
-    "quantile": of_quantile,
-    "transformer": of_transformer,
+    "quantile": generated("quantile"),
+    "transformer": generated("transformer"),
     "histogram": of_histogram,
 }
 
