@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 from support.tiny_models import release, tiny_model
 
-# Started in the background, a shell makes tests and all their children ignore Ctrl-C, which some of them are about.
+# Some tests are about signals that they and all their children would ignore where they were started in the background of
+# a shell (Ctrl-C) or by nohup (SIGHUP).
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 @pytest.fixture
