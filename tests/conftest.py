@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from support.tiny_models import release, tiny_model
 
-# Some tests are about signals that they and all their children would ignore where they were started in the background of
+# Some tests are about signals that they and all their children would ignore when started in the background of
 # a shell (Ctrl-C) or by nohup (SIGHUP).
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
