@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, distribution
 
 import onnxruntime
 
-from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.errors import RefusedError, first_line
 
 __all__ = ["DEVICES", "open_session"]
 
@@ -83,8 +83,7 @@ def _load(content: bytes, name: str, provider: str) -> onnxruntime.InferenceSess
     try:
         return onnxruntime.InferenceSession(content, options, providers=settings, enable_fallback=0)
     except Exception as error:  # ONNX Runtime's own classes have no common base
-        reason = str(error).strip().splitlines()[0]
-        raise RefusedError(f"{name} is no ONNX model that can be run: {reason}") from error
+        raise RefusedError(f"{name} is no ONNX model that can be run: {first_line(error)}") from error
 
 
 def _load_on_cuda(content: bytes, name: str) -> onnxruntime.InferenceSession | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["DeepMuonError", "FailedError", "RefusedError"]
+__all__ = ["DeepMuonError", "FailedError", "RefusedError", "first_line"]
 
 
 class DeepMuonError(Exception):
@@ -15,3 +15,9 @@ class RefusedError(DeepMuonError):
 
 class FailedError(DeepMuonError):
     """Failed while running: disk full, a bad muon, a lost race for the output (exit code 1 of a command)."""
+
+
+def first_line(error: Exception) -> str:
+    """Return the first line of another library's error, or what sort of error it is where that has no text."""
+    lines = str(error).strip().splitlines()
+    return lines[0] if lines else type(error).__name__

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from deepmuon_runtime.errors import FailedError, RefusedError
+from deepmuon_runtime.errors import FailedError, RefusedError, first_line
 from deepmuon_runtime.latent import checked_seed, fill_latents, new_seed
 from deepmuon_runtime.model import LATENTS_PER_MUON, Model
 from deepmuon_runtime.muon_file import BYTES_PER_MUON, MuonWriter, check_output
@@ -326,7 +326,7 @@ class Generator:
         try:
             energy, direction, charge = run()
         except Exception as error:  # ONNX Runtime's own classes have no common base
-            reason = str(error).strip().splitlines()[0]
+            reason = first_line(error)
             raise FailedError(f"the model {self.model.name} failed: {reason}") from error
         kept = slice(skipped, skipped + len(muons))
         muons.kinetic_energy[:] = energy[kept]

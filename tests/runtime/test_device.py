@@ -71,3 +71,15 @@ def test_onnx_runtime_keeps_no_identifier_and_sends_nothing(model_file):
     environment = {"HOME": str(model_file / "nowhere"), "OMP_NUM_THREADS": "1"}
     done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_an_error_of_onnx_runtime_without_a_text_is_told_by_its_name(model_file, monkeypatch):
+    class WordlessError(Exception):
+        """As one version raises it on some damaged models."""
+
+    def refuse(*arguments, **options):
+        raise WordlessError
+
+    monkeypatch.setattr(onnxruntime, "InferenceSession", refuse)
+    with pytest.raises(RefusedError, match=r"can be run: WordlessError$"):
+        Generator.open(file=model_file, device="cpu")
