@@ -10,23 +10,19 @@ __all__ = ["write_whole"]
 
 
 def write_whole(path: str | Path, contents: bytes, *, overwrite: bool = False) -> None:
-    """Write a file under a temporary name in its folder, flush it to disk, then give it its name.
+    """Write a file that is complete under its name, or not there; arguments and errors are those of `whole_file`.
 
     Parameters
     ----------
-    path
-        The wanted file; its folder must exist.
+    path, overwrite
+        As for `deepmuon_runtime.whole_file.whole_file`.
     contents
-        All of it.
-    overwrite
-        Whether an existing file is replaced.
+        All of the file.
 
     Raises
     ------
-    RefusedError
-        If the file exists (without `overwrite`), or its folder is missing or not writable.
-    FailedError
-        If it can't be written all the same, or another process has written it meanwhile.
+    RefusedError, FailedError
+        As `deepmuon_runtime.whole_file.whole_file` raises them.
     """
     with whole_file(path, overwrite=overwrite) as file:
         file.write(contents)
