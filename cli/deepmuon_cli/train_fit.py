@@ -62,8 +62,8 @@ def command(
     Ctrl-C leaves a checkpoint, at most half a minute old, and the same command goes on from it to the same generator. A
     checkpoint of other muons, another seed or other settings is refused.
 
-    The last twentieth of the muons decides when to stop. 3,000 muons are the fewest; a good generator takes
-    a million. They need to be independent, and in no particular order.
+    The last twentieth of the muons, 500,000 at most, decides when to stop. 3,000 muons are the fewest; a good generator
+    takes a million. They need to be independent, and in no particular order.
 
     --azimuth uniform is accepted where harmonics 1 to 4 of the muons' azimuth are zero within noise, below 1 GeV, from
     1 to 10 GeV and above; one in ten thousand uniform samples is refused by chance. Few muons prove little: 100,000

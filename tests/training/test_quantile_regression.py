@@ -89,7 +89,7 @@ def test_the_regression_has_no_randomness_of_its_own():
 
 @pytest.mark.parametrize("rounds", [0, 1, 3])
 def test_a_regression_that_was_killed_goes_on_to_the_same_weights_bit_by_bit(tmp_path, monkeypatch, rounds):
-    judge, calls = quantile_regression._judge, iter(range(rounds))
+    judge, calls = quantile_regression._judge, iter(range(10 + rounds))  # ten looks while Adam runs
 
     def dying(*arguments):
         if next(calls, None) is None:
@@ -123,42 +123,57 @@ def test_progress_changes_nothing(capfd):
     assert "4/4" in capfd.readouterr().err
 
 
-def losses(monkeypatch, values: list[float], spread: float = 0.0) -> list[torch.Tensor]:
-    """Plan the mean of the validation losses, and the spread of their differences; return the weights at each look."""
+def losses(monkeypatch, values: list[float]) -> list[torch.Tensor]:
+    """Plan the validation losses: 10 looks while Adam runs, one after each round; return the weights at each look."""
     looks: list[torch.Tensor] = []
 
     def planned(network, condition, observed):
         looks.append(weights(network).float())
-        random = torch.Generator().manual_seed(len(looks))
-        noise = torch.randn(10_000, generator=random)
-        return values[len(looks) - 1] + spread * (noise - noise.mean())
+        return values[len(looks) - 1]
 
-    monkeypatch.setattr(quantile_regression, "_validation_losses", planned)
+    monkeypatch.setattr(quantile_regression, "_validation_loss", planned)
     return looks
 
 
+ADAM = [9.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5]
+
+
 def test_it_stops_when_patience_ends_and_keeps_the_best_weights(monkeypatch):
-    looks = losses(monkeypatch, [3.0, 1.0, 2.0, 2.0, 0.5])
+    looks = losses(monkeypatch, [*ADAM, 1.0, 2.0, 2.0, 0.5])
     network, loss = trained(replace(SHORT, patience=2))
-    assert len(looks) == 4  # after Adam, and after three rounds
+    assert len(looks) == 13  # three rounds after Adam
     assert loss == 1.0
-    assert torch.equal(weights(network), looks[1])
+    assert torch.equal(weights(network), looks[10])
 
 
-def test_later_weights_that_are_worse_by_less_than_two_standard_errors_are_kept(monkeypatch):
-    looks = losses(monkeypatch, [3.0, 1.0, 1.02, 1.02, 1.04], spread=1.0)  # two standard errors are 0.028
-    network, loss = trained(SHORT)
-    assert len(looks) == 5
-    assert loss == pytest.approx(1.02)
+def test_weights_in_the_middle_of_adam_are_kept_where_they_are_the_best(monkeypatch):
+    looks = losses(monkeypatch, [*ADAM[:3], 0.5, *ADAM[4:], 1.0, 1.0, 1.0])
+    network, loss = trained(replace(SHORT, patience=3))
+    assert len(looks) == 13  # what Adam's looks missed does not count
+    assert loss == 0.5
     assert torch.equal(weights(network), looks[3])
 
 
-def test_it_stops_after_the_last_round_at_the_latest(monkeypatch):
-    looks = losses(monkeypatch, [5.0, 4.0, 3.0, 2.0, 1.0, 0.0])
+def test_later_weights_that_are_hardly_worse_are_kept(monkeypatch):
+    looks = losses(monkeypatch, [*ADAM, 1.0, 1.000008, 1.000008, 1.00002])
     network, loss = trained(SHORT)
-    assert len(looks) == 5
-    assert loss == 1.0
-    assert torch.equal(weights(network), looks[4])
+    assert len(looks) == 14
+    assert loss == 1.000008
+    assert torch.equal(weights(network), looks[12])
+
+
+def test_it_stops_after_the_last_round_at_the_latest(monkeypatch):
+    looks = losses(monkeypatch, [*ADAM, 1.4, 1.3, 1.2, 1.1, 0.0])
+    network, loss = trained(SHORT)
+    assert len(looks) == 14
+    assert loss == 1.1
+    assert torch.equal(weights(network), looks[13])
+
+
+def test_of_many_steps_of_adam_fifteen_are_looked_at(monkeypatch):
+    looks = losses(monkeypatch, [1.0] * 16)
+    trained(RegressionSteps(adam=31, round=1, rounds=1))
+    assert len(looks) == 16
 
 
 def test_the_validation_loss_is_the_pinball_loss_over_all_levels(conditional_and_loss):

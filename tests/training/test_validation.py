@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from deepmuon_training.validation import split
+from deepmuon_training.validation import split, training_rows
 
 
 @pytest.mark.parametrize("n", [20, 999, 100_000])
@@ -19,3 +19,8 @@ def test_the_parts_lie_together_in_memory():
     columns = np.arange(300.0).reshape(100, 3)
     for part in split(*columns.T):
         assert all(column.flags.c_contiguous for column in part)
+
+
+def test_of_a_large_sample_half_a_million_muons_validate():
+    assert training_rows(10_000_000) == 9_500_000
+    assert training_rows(100_000_000) == 99_500_000

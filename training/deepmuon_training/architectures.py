@@ -47,7 +47,7 @@ def fit_generator(
     checkpoint_folder: Path | None = None,
     progress: bool = True,
 ) -> FittedGenerator:
-    """Fit a generator to a sample, the last twentieth of which validates.
+    """Fit a generator to a sample, the last twentieth of which (500,000 muons at most) validates.
 
     The number of threads (``torch.set_num_threads``) belongs to the result: other numbers round otherwise.
 

@@ -3,13 +3,13 @@
 The squared difference of two quantile functions, integrated over the level, is the squared Wasserstein distance of
 their distributions in one dimension. Each difference is weighted by the inverse variance of the empirical quantile,
 n u (1 - u) / s'^2 with n muons, level u and slope s' over the level's logit (R. Koenker, "Quantile regression",
-Cambridge 2005, section 4.2). When to stop, the pinball loss of other muons says, one by one and at all levels.
+Cambridge 2005, section 4.2). When to stop, the pinball loss of other muons says, without bins and at all levels.
 """
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -33,7 +33,8 @@ _BINS = np.arange(-9, 9.05, 0.1)  # logit of the condition's levels that bound i
 _FEWEST_IN_BIN, _FEWEST_BEYOND = 50, 5
 _FLATTEST = 0.05
 _LEVELS_OF_MUON = 4
-_SIGNIFICANT = 2.0  # standard errors; one would often be exceeded by chance in a dozen looks
+_LOOKS = 15  # while Adam runs: of a few thousand muons it learns the noise before it has done
+_NEGLIGIBLE = 1e-5  # relative; between rounds of L-BFGS on millions of muons the loss goes up and down by less
 _GOLDEN = (np.sqrt(5) - 1) / 2  # its multiples are spread evenly over (0, 1)
 
 Float = NDArray[np.float64]
@@ -62,7 +63,7 @@ class RegressionSteps:
     rounds
         How many such rounds at most.
     patience
-        Stop after so many rounds whose loss is significantly above the smallest one.
+        Stop after so many rounds with a larger loss than the smallest one.
     """
 
     adam: int = 1500
@@ -132,9 +133,10 @@ def regress_conditional(
     kept = Checkpoint(checkpoint, data=fingerprint(*initial, *training, *validation), steps=asdict(steps))
     state = kept.load()
     if state is None:
-        _run_adam(network, loss, steps.adam, progress)
-        found = _validation_losses(network, *validation)
-        state = {"round": 0, "misses": 0, "best": found, "kept": found, "weights": copy.deepcopy(network.state_dict())}
+        state = {"round": 0, "misses": 0, "best": np.inf, "kept": np.inf, "weights": {}}
+        for _ in _run_adam(network, loss, steps.adam, progress):
+            _judge(state, _validation_loss(network, *validation), network)
+        state["misses"] = 0
     else:
         network.load_state_dict(state.pop("network"))
         lbfgs.load_state_dict(state.pop("lbfgs"))
@@ -143,45 +145,51 @@ def regress_conditional(
     ) as bar:
         while state["round"] < steps.rounds and state["misses"] < steps.patience:
             lbfgs.step(lambda: _backward(lbfgs, loss))  # type: ignore[no-untyped-call]
-            found = _validation_losses(network, *validation)
+            found = _validation_loss(network, *validation)
             _judge(state, found, network)
+            state["round"] += 1
             kept.save(network=network.state_dict(), lbfgs=lbfgs.state_dict(), **state)
-            bar.set_postfix(pinball=f"{found.mean():.7g}", best=f"{state['best'].mean():.7g}", refresh=False)
+            bar.set_postfix(pinball=f"{found:.7g}", best=f"{state['best']:.7g}", refresh=False)
             bar.update()
     network.load_state_dict(state["weights"])
     network.float()
-    return float(state["kept"].mean())
+    return float(state["kept"])
 
 
-def _run_adam(network: ConditionalMonotoneMap, loss: Callable[[], torch.Tensor], steps: int, progress: bool) -> None:
+def _run_adam(
+    network: ConditionalMonotoneMap, loss: Callable[[], torch.Tensor], steps: int, progress: bool
+) -> Iterator[None]:
+    """Run Adam, and pause for a look at the network every now and then, at least at the end."""
     adam = torch.optim.Adam(network.parameters(), lr=0.01)
     fall = torch.optim.lr_scheduler.CosineAnnealingLR(adam, steps)
-    for _ in tqdm(range(steps), desc="zenith, Adam", disable=not progress, unit="step", mininterval=1):
+    for step in tqdm(range(steps), desc="zenith, Adam", disable=not progress, unit="step", mininterval=1):
         _backward(adam, loss)
         adam.step()
         fall.step()
+        if (step + 1) * _LOOKS // steps > step * _LOOKS // steps:
+            yield
+    if steps == 0:
+        yield
 
 
-def _judge(state: dict[str, Any], found: torch.Tensor, network: ConditionalMonotoneMap) -> None:
-    """Keep the weights unless their losses [n] are significantly above the best ones."""
-    excess = found - state["best"]
-    if excess.mean() > _SIGNIFICANT * excess.std() / np.sqrt(len(excess)):
+def _judge(state: dict[str, Any], found: float, network: ConditionalMonotoneMap) -> None:
+    """Keep the weights unless their loss is above the best one."""
+    if found > state["best"] * (1 + _NEGLIGIBLE):
         state["misses"] += 1
     else:
         state.update(kept=found, weights=copy.deepcopy(network.state_dict()), misses=0)
-    state["best"] = min(state["best"], found, key=torch.mean)
-    state["round"] += 1
+    state["best"] = min(state["best"], found)
 
 
-def _validation_losses(
+def _validation_loss(
     network: ConditionalMonotoneMap, condition: NDArray[np.float32], values: NDArray[np.float32]
-) -> torch.Tensor:
-    """Return each muon's pinball loss [n], mean over a few levels; those of all muons cover (0, 1) evenly."""
+) -> float:
+    """Return the pinball loss: each muon's at a few levels, which together cover (0, 1) evenly."""
     level = (np.arange(len(values))[:, None] * _GOLDEN + np.arange(_LEVELS_OF_MUON) / _LEVELS_OF_MUON) % 1
     level = torch.from_numpy(np.clip(level, 1e-6, 1 - 1e-6))
     with torch.no_grad():
         predicted = network(torch.logit(level), torch.from_numpy(condition).double().unsqueeze(-1))
-    return pinball_loss(predicted, torch.from_numpy(values).double().unsqueeze(-1), level).mean(dim=1)
+    return float(pinball_loss(predicted, torch.from_numpy(values).double().unsqueeze(-1), level).mean())
 
 
 def _backward(optimizer: torch.optim.Optimizer, loss: Callable[[], torch.Tensor]) -> float:

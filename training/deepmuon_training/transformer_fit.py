@@ -17,7 +17,7 @@ from deepmuon_training.fit import Schedule, fit
 from deepmuon_training.preprocessing import EnergyTransform
 from deepmuon_training.sliced_wasserstein import deepmuon_loss, random_directions, sliced_wasserstein
 from deepmuon_training.transformer import HEADS, LATENTS, Transformer
-from deepmuon_training.validation import VALIDATION_FRACTION
+from deepmuon_training.validation import training_rows
 
 __all__ = ["TransformerSettings", "features", "fit_transformer"]
 
@@ -106,8 +106,8 @@ def fit_transformer(
     network = Transformer(settings.d).to(device)
     columns = features(muons, transform)
     truth = columns.to(device)
-    held = len(truth) - round(len(truth) * (1 - VALIDATION_FRACTION))
-    training, validation = truth[:-held], truth[-held:]
+    training, validation = truth.tensor_split([training_rows(len(truth))])
+    held = len(validation)
     draws = settings.batch // settings.d
 
     def loss(network: nn.Module, random: torch.Generator) -> torch.Tensor:

@@ -7,13 +7,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["VALIDATION_FRACTION", "split"]
+__all__ = ["split", "training_rows"]
 
-VALIDATION_FRACTION = 0.05
-"""The last so much of the training sample decides when to stop and which weights to keep."""
+_FRACTION = 0.05
+_MOST = 500_000
+"""More would not decide better, and the networks hold a few kilobytes for each of them."""
+
+
+def training_rows(number: int) -> int:
+    """Return how many of the first muons train: all but the last twentieth, or the last half million if that is less."""
+    return max(round(number * (1 - _FRACTION)), number - _MOST)
 
 
 def split(*columns: NDArray[Any]) -> tuple[list[NDArray[Any]], list[NDArray[Any]]]:
-    """Cut columns of one length in those that train and those that validate."""
-    cut = round(len(columns[0]) * (1 - VALIDATION_FRACTION))
+    """Cut columns of one length in those that train and those that validate: decide when to stop and what to keep."""
+    cut = training_rows(len(columns[0]))
     return [np.ascontiguousarray(c[:cut]) for c in columns], [np.ascontiguousarray(c[cut:]) for c in columns]
