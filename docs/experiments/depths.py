@@ -101,19 +101,27 @@ def spectra(muons: Muons) -> tuple[Float, Float]:
 def table(numbers: dict[int, dict[str, dict[str, float | None]]]) -> list[tuple[str, ...]]:
     """One row a depth and kind."""
     rows = [
-        ("depth", "muons of", "rate / (m² s)", "mean energy / GeV", "mean zenith", "chi2/ndf", "delta", "KS energy")
+        ("depth", "muons of", "rate / (m² s)", "mean zenith", "mean energy / GeV")
+        + ("over direct", "chi2/ndf", "delta", "KS energy", "KS noise")
     ]
     for depth, kinds in numbers.items():
+        direct = kinds["direct"]
         for name, of in kinds.items():
-            scores = (
-                (f"{of['chi2_ndf']:.2f}", f"{of['delta']:.2%}", f"{of['ks_energy']:.5f}")
-                if "delta" in of
-                else ("", "", "")
-            )
+            ratio = of["mean_energy"] / direct["mean_energy"]
+            error = ratio * np.hypot(*(each["mean_energy_error"] / each["mean_energy"] for each in (of, direct)))
+            scores = ("", "", "", "", "")
+            if "delta" in of:
+                scores = (
+                    f"{ratio:.4f} ± {error:.4f}",
+                    f"{of['chi2_ndf']:.2f}",
+                    f"{of['delta']:.2%}",
+                    f"{of['ks_energy']:.5f}",
+                    f"{of['ks_noise']:.5f}",
+                )
             rate = "unknown" if of["rate"] is None else f"{of['rate']:.3f}"
             energy = f"{of['mean_energy']:.3f} ± {of['mean_energy_error']:.3f}"
             zenith = f"{of['mean_zenith']:.2f}° ± {of['mean_zenith_error']:.2f}°"
-            rows.append((f"{depth} m", name, rate, energy, zenith, *scores))
+            rows.append((f"{depth} m", name, rate, zenith, energy, *scores))
     return rows
 
 

@@ -15,7 +15,7 @@ _MOST = 500_000
 
 
 def training_rows(number: int) -> int:
-    """Return how many of the first muons train: all but the last twentieth, or the last half million if that is less."""
+    """Return how many of the first muons train: all but a twentieth, or but half a million if that is less."""
     return max(round(number * (1 - _FRACTION)), number - _MOST)
 
 

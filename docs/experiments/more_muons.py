@@ -1,0 +1,89 @@
+"""What a hundred million muons of CRY teach more than six million.
+
+    python docs/experiments/more_muons.py --much-cry cry_100M.h5 --held-out-cry cry_40M.h5 --work work
+
+Both files are smoothed by maps of the first one, so that what the maps know is the same. The generators of six
+million muons are the released ones. Finished fits lie in the work folder and are not repeated.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+import torch
+from report import write
+from trained import SEED, trained
+
+from deepmuon_runtime import Generator, Muons
+from deepmuon_training.evaluate import evaluate
+from deepmuon_training.sample import read_cry, read_sample, write_sample
+from deepmuon_training.smoothing import StepSmoother, smoothed
+
+GENERATED = 20_000_000
+ARCHITECTURES = ("quantile", "transformer")
+SHOWN = {
+    "KS energy": ".5f",
+    "KS cos zenith": ".5f",
+    "cells: delta": ".2%",
+    "energy bin": ".2%",
+    "tail above 100 GeV": ".3f",
+    "tail above 300 GeV": ".3f",
+    "tail cos zenith below 0.2": ".3f",
+    "classifier: AUC": ".4f",
+}
+"""Scores in the table, and how they are written."""
+
+FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+@click.command(help=__doc__)
+@click.option("--much-cry", required=True, type=FILE, help="CRY's muons that train.")
+@click.option("--held-out-cry", required=True, type=FILE, help="Those of another run, which judge.")
+@click.option("--work", required=True, type=click.Path(path_type=Path), help="Folder for samples and generators.")
+def main(much_cry: Path, held_out_cry: Path, work: Path) -> None:
+    """Fit the generators that are missing, and judge them beside the released ones."""
+    torch.set_num_threads(1)
+    work.mkdir(parents=True, exist_ok=True)
+    training, testing = work / "training.h5", work / "testing.h5"
+    if not (training.exists() and testing.exists()):
+        smooth_both(much_cry, training, held_out_cry, testing)
+    sample = read_sample(training)
+    generators = {}
+    for architecture in ARCHITECTURES:
+        generators[architecture, "6,000,000"] = Generator.open(0, architecture=architecture)
+        generators[architecture, "100,000,000"] = trained(sample, architecture, work / architecture)
+    truth = read_sample(testing).muons
+    muons = {("none: CRY itself", "100,000,000"): sample.muons[:GENERATED]}
+    results = {key: scores(part, truth) for key, part in muons.items()}
+    del sample, muons
+    for key, generator in generators.items():
+        results[key] = scores(generator.sample(GENERATED, seed=SEED), truth, generator.model.muons_per_draw)
+    numbers = [{"architecture": key[0], "trained_on": key[1], "scores": of} for key, of in results.items()]
+    write("more_muons", {"held_out": len(truth), "generated": GENERATED, "results": numbers}, table(results))
+
+
+def scores(muons: Muons, truth: Muons, muons_per_draw: int = 1) -> dict[str, float | None]:
+    """Scores by name."""
+    evaluation = evaluate(muons, truth, seed=SEED, muons_per_draw=muons_per_draw)
+    return {score.name.split(",")[0]: score.value for score in evaluation.scores()}
+
+
+def table(results: dict[tuple[str, str], dict[str, float | None]]) -> list[tuple[str, ...]]:
+    """One row for each generator."""
+    rows = [("generator", "muons it learned from", *SHOWN)]
+    for key, of in results.items():
+        rows.append((*key, *(format(of[name], how) for name, how in SHOWN.items())))
+    return rows
+
+
+def smooth_both(much: Path, training: Path, held_out: Path, testing: Path) -> None:
+    """Write both samples without CRY's steps."""
+    sample = read_cry(much)
+    smooth = StepSmoother(sample.muons)
+    write_sample(training, smoothed(sample, smooth), overwrite=True)
+    write_sample(testing, smoothed(read_cry(held_out), smooth), overwrite=True)
+
+
+if __name__ == "__main__":
+    main()
