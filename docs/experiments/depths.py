@@ -100,10 +100,8 @@ def spectra(muons: Muons) -> tuple[Float, Float]:
 
 def table(numbers: dict[int, dict[str, dict[str, float | None]]]) -> list[tuple[str, ...]]:
     """One row a depth and kind."""
-    rows = [
-        ("depth", "muons of", "rate / (m² s)", "mean zenith", "mean energy / GeV")
-        + ("over direct", "chi2/ndf", "delta", "KS energy", "KS noise")
-    ]
+    means = ("rate / (m² s)", "mean zenith", "mean energy / GeV", "over direct")
+    rows = [("depth", "muons of", *means, "chi2/ndf", "delta", "KS energy", "KS noise")]
     for depth, kinds in numbers.items():
         direct = kinds["direct"]
         for name, of in kinds.items():
