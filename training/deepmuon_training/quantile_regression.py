@@ -34,7 +34,7 @@ _FEWEST_IN_BIN, _FEWEST_BEYOND = 50, 5
 _FLATTEST = 0.05
 _LEVELS_OF_MUON = 4
 _LOOKS = 15  # while Adam runs: of a few thousand muons it learns the noise before it has done
-_NEGLIGIBLE = 1e-5  # relative; between rounds of L-BFGS on millions of muons the loss goes up and down by less
+_NEGLIGIBLE = 2e-5  # relative; between rounds of L-BFGS on millions of muons the loss goes up and down by less
 _GOLDEN = (np.sqrt(5) - 1) / 2  # its multiples are spread evenly over (0, 1)
 
 Float = NDArray[np.float64]
