@@ -135,30 +135,35 @@ def draw(
         for axes, (key, label) in zip(top.subplots(1, 3), labels.items(), strict=True):
             for name, marker, color in zip(("direct", "released", "layered"), "o+x", ("black", *COLOURS), strict=False):
                 values = [numbers[depth][name][key] for depth in depths]
-                axes.plot(depths, values, marker, color=color, label=name, fillstyle="none")
+                errors = [numbers[depth][name].get(f"{key}_error", 0.0) for depth in depths]
+                axes.errorbar(depths, values, errors, fmt=marker, color=color, label=name, fillstyle="none")
             axes.set(xlabel="depth / m", ylabel=label)
         top.axes[0].set(yscale="log")
         top.axes[0].legend()
-        grid = bottom.subplots(2, 4, height_ratios=[5, 2])
+        grid = bottom.subplots(2, 4, sharex="col", height_ratios=[5, 2])
         shown = [depth for depth in COMPARED if depth in drawn]
         for k, depth in enumerate(shown):
             for column, edges, log in ((0, ENERGY_EDGES, True), (1, COS_EDGES, False)):
-                draw_spectrum(grid[:, 2 * k + column], {n: s[column] for n, s in drawn[depth].items()}, edges, log)
+                curves = {name: of[column] for name, of in drawn[depth].items()}
+                draw_spectrum(grid[:, 2 * k + column], curves, numbers[depth]["direct"]["muons"], edges, log)
                 grid[0, 2 * k + column].set(title=f"{depth} m")
         grid[0, 0].legend(fontsize="small")
     return figure
 
 
-def draw_spectrum(pair: NDArray[np.object_], curves: dict[str, Float], edges: Float, log: bool) -> None:
-    """Draw fractions above, ratios to the direct ones below."""
+def draw_spectrum(
+    pair: NDArray[np.object_], curves: dict[str, Float], direct_muons: float, edges: Float, log: bool
+) -> None:
+    """Draw fractions above, below their ratios to the direct ones, whose noise is grey."""
     upper, lower = pair
-    direct = np.where(curves["direct"] > 1e-4, curves["direct"], np.nan)
+    direct = np.where(curves["direct"] * direct_muons >= 25, curves["direct"], np.nan)
     for (name, values), color in zip(curves.items(), ("black", *COLOURS), strict=False):
         upper.stairs(values, edges, baseline=None, color=color, label=name)
         lower.stairs(values / direct, edges, baseline=None, color=color)
+    noise = 1 / np.sqrt(direct * direct_muons)
+    lower.stairs(1 + noise, edges, baseline=1 - noise, fill=True, color="0.85")
     upper.set(yscale="log", xscale="log" if log else "linear", ylim=(1e-6, None))
-    lower.set(xscale="log" if log else "linear", ylim=(0.9, 1.1))
-    lower.set(xlabel="kinetic energy / GeV" if log else "cos zenith")
+    lower.set(ylim=(0.9, 1.1), xlabel="kinetic energy / GeV" if log else "cos zenith")
 
 
 if __name__ == "__main__":

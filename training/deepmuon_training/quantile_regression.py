@@ -29,7 +29,8 @@ __all__ = ["RegressionSteps", "regress", "regress_conditional"]
 
 _POINTS, _SLOPE_POINTS = 4001, 81
 _LEVELS = np.linspace(-11, 11, 89)  # logit of the levels at which conditional quantiles are compared
-_BINS = np.arange(-9, 9.05, 0.1)  # logit of the condition's levels that bound its bins
+_REACH = 9  # logit of the condition's levels that bound its bins, the outermost ones
+_NARROWEST, _WIDTH_OF_ONE = 0.1, 62.0  # width of the bins; in the middle they hold sixteen times the root of the sample
 _FEWEST_IN_BIN, _FEWEST_BEYOND = 50, 5
 _FLATTEST = 0.05
 _LEVELS_OF_MUON = 4
@@ -83,10 +84,10 @@ def regress_conditional(
 ) -> float:
     """Fit a conditional map to the quantiles of values in some 180 bins of their condition.
 
-    The bins are even in the logit of the condition's level, so that the sparse ends are resolved too. Adam is followed
-    by L-BFGS (D. C. Liu and J. Nocedal, Math. Program. 45 (1989) 503), in double precision. The network is left
-    with the last weights whose pinball loss of the validation muons is not significantly above the smallest one: by
-    more than two standard errors of their difference, muon by muon.
+    The bins are even in the logit of the condition's level, so that the sparse ends are resolved too. Below 400,000
+    muons they are wider, by the root of their number: narrow ones would have no tails to learn from. Adam is followed
+    by L-BFGS (D. C. Liu and J. Nocedal, Math. Program. 45 (1989) 503), in double precision. The network is left with
+    the weights that have the smallest pinball loss of the validation muons, the last ones where it hardly differs.
 
     Parameters
     ----------
@@ -203,7 +204,9 @@ def _binned_quantiles(condition: NDArray[np.float32], values: NDArray[np.float32
     """Return the bins' mean condition [bins], and quantiles and weights at the levels [bins, levels]."""
     order = np.argsort(condition)
     condition, values = condition[order].astype(np.float64), values[order].astype(np.float64)
-    edges = np.round(len(values) * np.concatenate([[0], expit(_BINS), [1]])).astype(int)
+    width = max(_NARROWEST, _WIDTH_OF_ONE / np.sqrt(len(values)))
+    levels = expit(np.arange(-_REACH, _REACH + width / 2, width))
+    edges = np.round(len(values) * np.concatenate([[0], levels, [1]])).astype(int)
     rows = [slice(a, b) for a, b in pairwise(edges) if b - a >= _FEWEST_IN_BIN]
     level = expit(_LEVELS)
     # Hazen's plotting positions are nearly unbiased in the logarithm of a tail's level.
