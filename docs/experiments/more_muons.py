@@ -12,27 +12,15 @@ from pathlib import Path
 
 import click
 import torch
+from judged import GENERATED, scores, scores_of, table
 from report import write
-from trained import SEED, trained
+from trained import trained
 
-from deepmuon_runtime import Generator, Muons
-from deepmuon_training.evaluate import evaluate
+from deepmuon_runtime import Generator
 from deepmuon_training.sample import read_cry, read_sample, write_sample
 from deepmuon_training.smoothing import StepSmoother, smoothed
 
-GENERATED = 20_000_000
 ARCHITECTURES = ("quantile", "transformer")
-SHOWN = {
-    "KS energy": ".5f",
-    "KS cos zenith": ".5f",
-    "cells: delta": ".2%",
-    "energy bin": ".2%",
-    "tail above 100 GeV": ".3f",
-    "tail above 300 GeV": ".3f",
-    "tail cos zenith below 0.2": ".3f",
-    "classifier: AUC": ".4f",
-}
-"""Scores in the table, and how they are written."""
 
 FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
@@ -54,27 +42,12 @@ def main(much_cry: Path, held_out_cry: Path, work: Path) -> None:
         generators[architecture, "6,000,000"] = Generator.open(0, architecture=architecture)
         generators[architecture, "100,000,000"] = trained(sample, architecture, work / architecture)
     truth = read_sample(testing).muons
-    muons = {("none: CRY itself", "100,000,000"): sample.muons[:GENERATED]}
-    results = {key: scores(part, truth) for key, part in muons.items()}
-    del sample, muons
-    for key, generator in generators.items():
-        results[key] = scores(generator.sample(GENERATED, seed=SEED), truth, generator.model.muons_per_draw)
-    numbers = [{"architecture": key[0], "trained_on": key[1], "scores": of} for key, of in results.items()]
-    write("more_muons", {"held_out": len(truth), "generated": GENERATED, "results": numbers}, table(results))
-
-
-def scores(muons: Muons, truth: Muons, muons_per_draw: int = 1) -> dict[str, float | None]:
-    """Scores by name."""
-    evaluation = evaluate(muons, truth, seed=SEED, muons_per_draw=muons_per_draw)
-    return {score.name.split(",")[0]: score.value for score in evaluation.scores()}
-
-
-def table(results: dict[tuple[str, str], dict[str, float | None]]) -> list[tuple[str, ...]]:
-    """One row for each generator."""
-    rows = [("generator", "muons it learned from", *SHOWN)]
-    for key, of in results.items():
-        rows.append((*key, *(format(of[name], how) for name, how in SHOWN.items())))
-    return rows
+    results = {("CRY itself", "100,000,000"): scores(sample.muons[:GENERATED], truth)}
+    del sample
+    results |= {key: scores_of(generator, truth) for key, generator in generators.items()}
+    numbers = [{"muons_of": key[0], "learned_from": key[1], "scores": of} for key, of in results.items()]
+    rows = table(("muons of", "learned from"), results)
+    write("more_muons", {"held_out": len(truth), "generated": GENERATED, "results": numbers}, rows)
 
 
 def smooth_both(much: Path, training: Path, held_out: Path, testing: Path) -> None:

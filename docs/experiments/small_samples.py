@@ -16,6 +16,7 @@ from pathlib import Path
 import click
 import numpy as np
 import torch
+from judged import Scores, scores
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -25,7 +26,6 @@ from trained import SEED, trained
 
 from deepmuon_runtime import Generator, Muons, read_muons
 from deepmuon_training.architectures import Settings
-from deepmuon_training.evaluate import evaluate
 from deepmuon_training.fit import Schedule
 from deepmuon_training.histogram_scores import ENERGY_EDGES
 from deepmuon_training.plots import STYLE
@@ -67,7 +67,6 @@ SHOWN = {
 """Scores in the table, and how they are written; tails are relative to those of the held-out muons."""
 
 FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
-Scores = dict[str, float | None]
 Float = NDArray[np.float64]
 
 
@@ -109,8 +108,7 @@ def judge(muons: Muons, muons_per_draw: int, truth: Muons, stem: Path) -> Result
     """Compare muons with the held-out ones; their scores are read from STEM.json where they were found before."""
     path = stem.with_suffix(".json")
     if not path.exists():
-        evaluation = evaluate(muons, truth, seed=SEED, muons_per_draw=muons_per_draw)
-        path.write_text(json.dumps({score.name.split(",")[0]: score.value for score in evaluation.scores()}))
+        path.write_text(json.dumps(scores(muons, truth, muons_per_draw)))
     energy, cos_zenith = (
         np.histogram(a, edges)[0] / len(muons) / (np.histogram(b, edges)[0] / len(truth))
         for a, b, edges in (

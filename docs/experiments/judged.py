@@ -1,0 +1,45 @@
+"""Scores of generated muons by name, and the rows of a table of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from trained import SEED
+
+from deepmuon_runtime import Generator, Muons
+from deepmuon_training.evaluate import evaluate
+
+__all__ = ["GENERATED", "Scores", "scores", "scores_of", "table"]
+
+GENERATED = 20_000_000
+
+Scores = dict[str, float | None]
+
+SHOWN = {
+    "KS energy": ".5f",
+    "KS cos zenith": ".5f",
+    "cells: delta": ".2%",
+    "energy bin": ".2%",
+    "tail above 100 GeV": ".3f",
+    "tail above 300 GeV": ".3f",
+    "tail cos zenith below 0.2": ".3f",
+    "classifier: AUC": ".4f",
+}
+
+
+def scores(muons: Muons, truth: Muons, muons_per_draw: int = 1) -> Scores:
+    """Compare muons with held-out ones."""
+    evaluation = evaluate(muons, truth, seed=SEED, muons_per_draw=muons_per_draw)
+    return {score.name.split(",")[0]: score.value for score in evaluation.scores()}
+
+
+def scores_of(generator: Generator, truth: Muons) -> Scores:
+    """Compare twenty million muons of a generator with held-out ones."""
+    return scores(generator.sample(GENERATED, seed=SEED), truth, generator.model.muons_per_draw)
+
+
+def table(head: tuple[str, ...], results: Mapping[tuple[str, ...], Scores]) -> list[tuple[str, ...]]:
+    """One row for each generator, whose name has as many parts as the head; tails are relative to the held-out ones."""
+    rows = [(*head, *SHOWN)]
+    rows += [(*key, *(format(of[name], how) for name, how in SHOWN.items())) for key, of in results.items()]
+    return rows
