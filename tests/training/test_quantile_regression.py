@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 from scipy.special import expit, logit
-from scipy.stats import kstest
+from scipy.stats import kstest, norm
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_training import quantile_regression
@@ -203,6 +203,23 @@ def test_a_heavy_end_of_the_condition_does_not_break_the_bins():
     sample = condition, values
     regress_conditional(network, sample, sample, RegressionSteps(adam=20, round=5, rounds=1), progress=False)
     assert np.all(np.isfinite(mapped(network, np.zeros((3, 1)), [[-0.5], [0.0], [0.5]])))
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_a_few_thousand_muons_give_tails_that_are_theirs(seed):
+    # Bins of a hundred muons say nothing of the outer five per cent. The logistic tails that went on from there, and
+    # maps kept after they had learned the noise, had once half or twice as many muons beyond the 1 % levels.
+    random = np.random.default_rng(seed)
+    condition = 2 * random.random(6000) - 1
+    values = centre(condition) + random.normal(size=6000)
+    parts = [np.float32([condition[rows], values[rows]]) for rows in (slice(300, None), slice(300))]
+    torch.manual_seed(1)
+    network = ConditionalMonotoneMap(units=33, reach=12.0, conditions=1, hidden=32)
+    regress_conditional(network, *parts, RegressionSteps(round=50, rounds=3), progress=False)
+    condition, level = 2 * random.random(40_000) - 1, random.random(40_000)
+    normal = mapped(network, logit(level)[:, None], condition[:, None])[:, 0] - centre(condition)
+    beyond = [np.mean(normal < norm.ppf(0.01)), np.mean(normal > norm.ppf(0.99))]
+    assert beyond == pytest.approx([0.01, 0.01], rel=0.35)  # 57 muons of the sample: 13 %, once in 70 seeds beyond
 
 
 def test_the_slope_has_no_ripples_where_the_truth_is_a_straight_line(conditional_and_loss):
