@@ -161,7 +161,7 @@ def draw_spectrum(
         upper.stairs(values, edges, baseline=None, color=color, label=name)
         lower.stairs(values / direct, edges, baseline=None, color=color)
     noise = 1 / np.sqrt(direct * direct_muons)
-    lower.stairs(1 + noise, edges, baseline=1 - noise, fill=True, color="0.85")
+    lower.stairs(1 + noise, edges, baseline=1 - noise, fill=True, color="0.85", zorder=0)
     upper.set(yscale="log", xscale="log" if log else "linear", ylim=(1e-6, None))
     lower.set(ylim=(0.9, 1.1), xlabel="kinetic energy / GeV" if log else "cos zenith")
 
