@@ -100,8 +100,7 @@ def spectra(muons: Muons) -> tuple[Float, Float]:
 
 def table(numbers: dict[int, dict[str, dict[str, float | None]]]) -> list[tuple[str, ...]]:
     """One row a depth and kind."""
-    means = ("rate / (m² s)", "mean zenith", "mean energy / GeV", "over direct")
-    rows = [("depth", "muons of", *means, "chi2/ndf", "delta", "KS energy", "KS noise")]
+    rows = [("depth", "muons of", "rate", "zenith", "energy", "over direct", "chi2/ndf", "delta", "KS energy", "noise")]
     for depth, kinds in numbers.items():
         direct = kinds["direct"]
         for name, of in kinds.items():
@@ -110,17 +109,22 @@ def table(numbers: dict[int, dict[str, dict[str, float | None]]]) -> list[tuple[
             scores = ("", "", "", "", "")
             if "delta" in of:
                 scores = (
-                    f"{ratio:.4f} ± {error:.4f}",
+                    short(ratio, error, 4),
                     f"{of['chi2_ndf']:.2f}",
                     f"{of['delta']:.2%}",
                     f"{of['ks_energy']:.5f}",
                     f"{of['ks_noise']:.5f}",
                 )
             rate = "unknown" if of["rate"] is None else f"{of['rate']:.3f}"
-            energy = f"{of['mean_energy']:.3f} ± {of['mean_energy_error']:.3f}"
-            zenith = f"{of['mean_zenith']:.2f}° ± {of['mean_zenith_error']:.2f}°"
+            energy = short(of["mean_energy"], of["mean_energy_error"], 3)
+            zenith = short(of["mean_zenith"], of["mean_zenith_error"], 3)
             rows.append((f"{depth} m", name, rate, zenith, energy, *scores))
     return rows
+
+
+def short(value: float, error: float, digits: int) -> str:
+    """Write 17.968 with an error of 0.058 as 17.968(58)."""
+    return f"{value:.{digits}f}({max(1, round(error * 10**digits))})"
 
 
 def draw(
