@@ -100,25 +100,24 @@ def spectra(muons: Muons) -> tuple[Float, Float]:
 
 def table(numbers: dict[int, dict[str, dict[str, float | None]]]) -> list[tuple[str, ...]]:
     """One row a depth and kind."""
-    rows = [("depth", "muons of", "rate", "zenith", "energy", "over direct", "chi2/ndf", "delta", "KS energy", "noise")]
+    rows = [("muons", "rate", "zenith", "energy", "to direct", "χ²/ndf", "delta", "KS (noise)")]
     for depth, kinds in numbers.items():
         direct = kinds["direct"]
         for name, of in kinds.items():
             ratio = of["mean_energy"] / direct["mean_energy"]
             error = ratio * np.hypot(*(each["mean_energy_error"] / each["mean_energy"] for each in (of, direct)))
-            scores = ("", "", "", "", "")
+            scores = ("", "", "", "")
             if "delta" in of:
                 scores = (
                     short(ratio, error, 4),
                     f"{of['chi2_ndf']:.2f}",
                     f"{of['delta']:.2%}",
-                    f"{of['ks_energy']:.5f}",
-                    f"{of['ks_noise']:.5f}",
+                    f"{of['ks_energy']:.4f} ({of['ks_noise']:.4f})",
                 )
             rate = "unknown" if of["rate"] is None else f"{of['rate']:.3f}"
             energy = short(of["mean_energy"], of["mean_energy_error"], 3)
             zenith = short(of["mean_zenith"], of["mean_zenith_error"], 3)
-            rows.append((f"{depth} m", name, rate, zenith, energy, *scores))
+            rows.append((f"{depth} m, {name}", rate, zenith, energy, *scores))
     return rows
 
 
