@@ -16,15 +16,14 @@ GENERATED = 20_000_000
 Scores = dict[str, float | None]
 
 SHOWN = {
-    "KS energy": ".5f",
-    "KS cos zenith": ".5f",
-    "cells: delta": ".2%",
-    "energy bin": ".2%",
-    "tail above 100 GeV": ".3f",
-    "tail above 300 GeV": ".3f",
-    "tail cos zenith below 0.2": ".3f",
-    "classifier: AUC": ".4f",
+    "KS energy": ("KS energy", ".5f"),
+    "KS cos zenith": ("KS cos θ", ".5f"),
+    "cells: delta": ("delta", ".2%"),
+    "tail above 300 GeV": ("> 300 GeV", ".3f"),
+    "tail cos zenith below 0.2": ("cos θ < 0.2", ".3f"),
+    "classifier: AUC": ("AUC", ".4f"),
 }
+"""Scores in a table: their heads, and how they are written."""
 
 
 def scores(muons: Muons, truth: Muons, muons_per_draw: int = 1) -> Scores:
@@ -40,6 +39,6 @@ def scores_of(generator: Generator, truth: Muons) -> Scores:
 
 def table(head: tuple[str, ...], results: Mapping[tuple[str, ...], Scores]) -> list[tuple[str, ...]]:
     """One row for each generator, whose name has as many parts as the head; tails are relative to the held-out ones."""
-    rows = [(*head, *SHOWN)]
-    rows += [(*key, *(format(of[name], how) for name, how in SHOWN.items())) for key, of in results.items()]
+    rows = [(*head, *(title for title, _ in SHOWN.values()))]
+    rows += [(*key, *(format(of[name], how) for name, (_, how) in SHOWN.items())) for key, of in results.items()]
     return rows
