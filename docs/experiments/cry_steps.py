@@ -5,8 +5,8 @@
 The first file trains (its last two million muons do not), the other one judges. How much of the steps a generator has
 is found by regression: of its fine-binned spectrum on CRY's, both less the smoothed one, beside a polynomial for what
 is slowly wrong. It is 0 for smoothed muons and 1 for CRY's own; likewise for the mean of cos zenith. Networks of the
-paper's kind are also stopped early, to see whether that keeps the steps out. Finished fits lie in the work folder and
-are not repeated.
+paper's kind are also trained for less long, to see whether that keeps the steps out. Finished fits lie in the work
+folder and are not repeated.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from pathlib import Path
 import click
 import numpy as np
 import torch
+from judged import GENERATED
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -34,7 +35,6 @@ from deepmuon_training.sample import HELD_OUT_CRY_MUONS, read_cry
 from deepmuon_training.smoothing import StepSmoother, smoothed
 from deepmuon_training.transformer_fit import TransformerSettings
 
-GENERATED = 20_000_000
 EDGES = 10.0 ** np.linspace(-0.6, 2.4, 151)
 """Ten bins to a cell of CRY's tables."""
 
@@ -130,7 +130,7 @@ class Judge:
         values, smooth, raw = (getattr(of, name) for of in (profile, self.smooth_profile, self.raw_profile))
         slow = legvander(np.linspace(-1, 1, len(smooth)), SLOW) * smooth[:, None]
         columns = np.column_stack([raw - smooth, slow])
-        sigma = np.sqrt(getattr(profile, f"{name}_variance"))
+        sigma = np.sqrt(sum(getattr(of, f"{name}_variance") for of in (profile, self.smooth_profile)))
         weighted = columns / sigma[:, None]
         solution = np.linalg.lstsq(weighted, (values - smooth) / sigma)[0]
         return float(solution[0]), float(np.sqrt(np.linalg.inv(weighted.T @ weighted)[0, 0]))
@@ -138,7 +138,7 @@ class Judge:
 
 def table(numbers: list[dict[str, float | str | None]]) -> list[tuple[str, ...]]:
     """One row for each set of muons."""
-    head = ("muons of", "trained on", "for", "steps in energy", "in cos zenith", "KS to CRY", "to smoothed", "delta")
+    head = ("muons of", "trained on", "training", "in energy", "in cos zenith", "KS to CRY", "to smoothed", "delta")
     rows: list[tuple[str, ...]] = [head]
     for of in numbers:
         rows.append(
@@ -157,7 +157,7 @@ def table(numbers: list[dict[str, float | str | None]]) -> list[tuple[str, ...]]
 
 
 def draw(judge: Judge, results: dict[tuple[str, str, int | None], tuple[dict[str, float], Profile]]) -> Figure:
-    """Draw the spectrum, ratios to the smoothed one, the mean angle, and what stopping early gives."""
+    """Draw the spectrum and the mean angle, and those of the generators relative to the smoothed ones."""
     kinds = (("quantile", None), ("transformer", STOPPED[-1]))
     colours = {"raw": COLOURS[1], "smoothed": COLOURS[0]}
     with rc_context(STYLE):
@@ -172,7 +172,7 @@ def draw(judge: Judge, results: dict[tuple[str, str, int | None], tuple[dict[str
         angle.set(title="mean of cos zenith")
         spectrum.legend()
         panels = [(kind, name) for kind in kinds for name in ("fraction", "cos_zenith")]
-        for axes, ((what, steps), name) in zip(grid[1:, :].flat[:4], panels, strict=False):
+        for axes, ((what, steps), name) in zip(grid[1:].flat, panels, strict=True):
             smooth = getattr(judge.smooth_profile, name)
             stairs(axes, getattr(judge.raw_profile, name) / smooth, "0.6", "CRY")
             for on, colour in colours.items():

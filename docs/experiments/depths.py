@@ -12,10 +12,12 @@ from pathlib import Path
 
 import click
 import numpy as np
+from judged import GENERATED
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from report import COLOURS, write
+from trained import SEED
 
 from deepmuon_runtime import Generator, Muons, list_models
 from deepmuon_training.histogram_scores import compare_cells, count_muons
@@ -23,7 +25,6 @@ from deepmuon_training.kolmogorov_smirnov import kolmogorov_smirnov
 from deepmuon_training.plots import STYLE
 from deepmuon_training.sample import Sample, read_sample
 
-GENERATED = 20_000_000
 ENERGY_EDGES = 10.0 ** np.linspace(-2, 3.5, 56)
 COS_EDGES = np.linspace(0, 1, 41)
 COMPARED = (10, 50)
@@ -46,7 +47,7 @@ def main(samples: Path, layered: Path) -> None:
             "released": Generator.open(depth, architecture="quantile"),
             "layered": Generator.open(file=layered / f"quantile-{depth}m.onnx"),
         }
-        muons = {name: generator.sample(GENERATED, seed=1) for name, generator in generators.items()}
+        muons = {name: generator.sample(GENERATED, seed=SEED) for name, generator in generators.items()}
         numbers[depth] = {
             "direct": moments(direct.muons, direct.rate),
             **{

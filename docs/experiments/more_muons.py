@@ -2,8 +2,8 @@
 
     python docs/experiments/more_muons.py --much-cry cry_100M.h5 --held-out-cry cry_40M.h5 --work work
 
-Both files are smoothed by maps of the first one, so that what the maps know is the same. The generators of six
-million muons are the released ones. Finished fits lie in the work folder and are not repeated.
+Both files are smoothed by maps of the first one. The generators of six million muons are the released ones, whose muons
+were smoothed by maps of their own. Finished fits lie in the work folder and are not repeated.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def main(much_cry: Path, held_out_cry: Path, work: Path) -> None:
         generators[architecture, "6,000,000"] = Generator.open(0, architecture=architecture)
         generators[architecture, "100,000,000"] = trained(sample, architecture, work / architecture)
     truth = read_sample(testing).muons
-    results = {("CRY itself", "100,000,000"): scores(sample.muons[:GENERATED], truth)}
+    results = {("CRY itself", ""): scores(sample.muons[:GENERATED], truth)}
     del sample
     results |= {key: scores_of(generator, truth) for key, generator in generators.items()}
     numbers = [{"muons_of": key[0], "learned_from": key[1], "scores": of} for key, of in results.items()]

@@ -134,7 +134,10 @@ def generated(architecture: str) -> Callable[[Sample, Path], tuple[Muons, int]]:
 
 
 def of_histogram(sample: Sample, stem: Path) -> tuple[Muons, int]:
-    """Muons of the sample's plain histogram: CRY's cells, uniform inside, each with its own charges."""
+    """Muons of the sample's plain histogram: CRY's cells, uniform inside, each with its own charges.
+
+    The few beyond the outermost edges, 10 MeV and 1 TeV, are put there.
+    """
     random = np.random.default_rng(SEED)
     rows = random.integers(len(sample), size=GENERATED)
     few = sample.muons
@@ -156,11 +159,12 @@ KINDS: dict[str, Callable[[Sample, Path], tuple[Muons, int]]] = {
 
 
 def summarise(results: list[Result], enough: NDArray[np.bool_]) -> dict[str, object]:
-    """Mean and standard deviation of every score; the deviations of the energy bins in the mean of all samples."""
+    """Mean and standard deviation of every score; the bins' deviations in the mean of all samples."""
     bins = np.mean([result.energy for result in results], axis=0) - 1
     return {
         "scores": {name: _spread(result.scores[name] for result in results) for name in results[0].scores},
         "energy_bins": bins.tolist(),
+        "zenith_bins": (np.mean([result.cos_zenith for result in results], axis=0) - 1).tolist(),
         "worst_energy_bin": max(bins[enough].tolist(), key=abs),
     }
 
@@ -205,7 +209,7 @@ def draw(results: dict[str, list[Result]]) -> Figure:
 def band(axes: Axes, edges: Float, ratios: Float, colour: str) -> None:
     """Draw the mean of ratios [samples, bins] and a band of their standard deviation."""
     mean, spread = ratios.mean(axis=0), ratios.std(axis=0, ddof=1)
-    axes.stairs(mean, edges, baseline=None, color=colour, label="mean of ten")
+    axes.stairs(mean, edges, baseline=None, color=colour, label="mean of all samples")
     axes.stairs(mean + spread, edges, baseline=mean - spread, fill=True, color=colour, alpha=0.2)
     axes.axhline(1, color="0.7", lw=0.7, zorder=0)
 

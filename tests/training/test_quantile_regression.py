@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import torch
 from scipy.special import expit, logit
 from scipy.stats import kstest, norm
 
-from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.errors import FailedError, RefusedError
 from deepmuon_training import quantile_regression
 from deepmuon_training.monotone import ConditionalMonotoneMap, MonotoneMap
 from deepmuon_training.quantile_regression import RegressionSteps, regress, regress_conditional
@@ -160,6 +161,19 @@ def test_later_weights_that_are_hardly_worse_are_kept(monkeypatch):
     assert len(looks) == 14
     assert loss == 1.00001
     assert torch.equal(weights(network), looks[12])
+
+
+def test_weights_whose_loss_is_no_number_are_not_kept(monkeypatch):
+    looks = losses(monkeypatch, [*ADAM, 1.0, math.nan, math.inf, math.nan])
+    network, loss = trained(SHORT)
+    assert loss == 1.0
+    assert torch.equal(weights(network), looks[10])
+
+
+def test_a_regression_that_diverged_from_the_start_is_told(monkeypatch):
+    losses(monkeypatch, [math.nan] * 14)
+    with pytest.raises(FailedError, match="no finite number"):
+        trained(SHORT)
 
 
 def test_it_stops_after_the_last_round_at_the_latest(monkeypatch):

@@ -73,7 +73,7 @@ def fit_azimuth(
     Parameters
     ----------
     muons
-        In no particular order; the last twentieth validates.
+        In no particular order; the last ones validate (`validation.training_rows`).
     transform
         Makes the energy coordinate.
     seed

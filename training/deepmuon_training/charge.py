@@ -71,7 +71,7 @@ def fit_charge(
     Parameters
     ----------
     muons
-        In no particular order; the last twentieth validates.
+        In no particular order; the last ones validate (`validation.training_rows`).
     transform
         Makes the energy coordinate.
     seed

@@ -54,7 +54,7 @@ def fit_quantile(
     checkpoint_folder: Path | None = None,
     progress: bool = True,
 ) -> QuantileGenerator:
-    """Train a generator on muons, the last twentieth of which validates.
+    """Train a generator on muons, the last of which validate (`validation.training_rows`).
 
     Parameters
     ----------

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.special import expit, logit
 from tqdm import tqdm
 
+from deepmuon_runtime.errors import FailedError
 from deepmuon_training.checkpoint import Checkpoint, fingerprint
 from deepmuon_training.monotone import ConditionalMonotoneMap, MonotoneMap
 from deepmuon_training.pinball import pinball_loss
@@ -29,8 +30,8 @@ __all__ = ["RegressionSteps", "regress", "regress_conditional"]
 
 _POINTS, _SLOPE_POINTS = 4001, 81
 _LEVELS = np.linspace(-11, 11, 89)  # logit of the levels at which conditional quantiles are compared
-_REACH = 9  # logit of the condition's levels that bound its bins, the outermost ones
-_NARROWEST, _WIDTH_OF_ONE = 0.1, 62.0  # width of the bins; in the middle they hold sixteen times the root of the sample
+_REACH = 9  # the bins of the condition lie between minus and plus this, in the logit of its level
+_NARROWEST, _WIDTH_BY_ROOT = 0.1, 62.0  # width; of n muons a bin in the middle holds 16 sqrt(n), or 1/40 of them
 _FEWEST_IN_BIN, _FEWEST_BEYOND = 50, 5
 _FLATTEST = 0.05
 _LEVELS_OF_MUON = 4
@@ -64,7 +65,7 @@ class RegressionSteps:
     rounds
         How many such rounds at most.
     patience
-        Stop after so many rounds with a larger loss than the smallest one.
+        Stop after so many rounds in a row with a larger loss than the smallest one.
     """
 
     adam: int = 1500
@@ -82,12 +83,13 @@ def regress_conditional(
     checkpoint: Path | None = None,
     progress: bool = True,
 ) -> float:
-    """Fit a conditional map to the quantiles of values in some 180 bins of their condition.
+    """Fit a conditional map to the quantiles of values in bins of their condition, 182 of them for a large sample.
 
     The bins are even in the logit of the condition's level, so that the sparse ends are resolved too. Below 400,000
     muons they are wider, by the root of their number: narrow ones would have no tails to learn from. Adam is followed
     by L-BFGS (D. C. Liu and J. Nocedal, Math. Program. 45 (1989) 503), in double precision. The network is left with
-    the weights that have the smallest pinball loss of the validation muons, the last ones where it hardly differs.
+    the weights that have the smallest pinball loss of the validation muons, of fifteen looks while Adam runs and one
+    after each round of L-BFGS; the last ones where it hardly differs.
 
     Parameters
     ----------
@@ -112,6 +114,8 @@ def regress_conditional(
     ------
     RefusedError
         If the checkpoint is of other data, steps or number of threads.
+    FailedError
+        If the loss was never a finite number.
     """
     points, quantiles, weights = (torch.from_numpy(part) for part in _binned_quantiles(*training))
     points = points.unsqueeze(-1)
@@ -134,7 +138,7 @@ def regress_conditional(
     kept = Checkpoint(checkpoint, data=fingerprint(*initial, *training, *validation), steps=asdict(steps))
     state = kept.load()
     if state is None:
-        state = {"round": 0, "misses": 0, "best": np.inf, "kept": np.inf, "weights": {}}
+        state = {"round": 0, "misses": 0, "best": np.inf, "kept": np.inf, "weights": None}
         for _ in _run_adam(network, loss, steps.adam, progress):
             _judge(state, _validation_loss(network, *validation), network)
         state["misses"] = 0
@@ -152,6 +156,8 @@ def regress_conditional(
             kept.save(network=network.state_dict(), lbfgs=lbfgs.state_dict(), **state)
             bar.set_postfix(pinball=f"{found:.7g}", best=f"{state['best']:.7g}", refresh=False)
             bar.update()
+    if state["weights"] is None:
+        raise FailedError("the validation loss of the zenith map is no finite number: training diverged")
     network.load_state_dict(state["weights"])
     network.float()
     return float(state["kept"])
@@ -174,11 +180,11 @@ def _run_adam(
 
 
 def _judge(state: dict[str, Any], found: float, network: ConditionalMonotoneMap) -> None:
-    """Keep the weights unless their loss is above the best one."""
-    if found > state["best"] * (1 + _NEGLIGIBLE):
-        state["misses"] += 1
-    else:
+    """Keep the weights unless their loss is above the best one, or no number."""
+    if np.isfinite(found) and found <= state["best"] * (1 + _NEGLIGIBLE):
         state.update(kept=found, weights=copy.deepcopy(network.state_dict()), misses=0)
+    else:
+        state["misses"] += 1
     state["best"] = min(state["best"], found)
 
 
@@ -204,7 +210,7 @@ def _binned_quantiles(condition: NDArray[np.float32], values: NDArray[np.float32
     """Return the bins' mean condition [bins], and quantiles and weights at the levels [bins, levels]."""
     order = np.argsort(condition)
     condition, values = condition[order].astype(np.float64), values[order].astype(np.float64)
-    width = max(_NARROWEST, _WIDTH_OF_ONE / np.sqrt(len(values)))
+    width = max(_NARROWEST, _WIDTH_BY_ROOT / np.sqrt(len(values)))
     levels = expit(np.arange(-_REACH, _REACH + width / 2, width))
     edges = np.round(len(values) * np.concatenate([[0], levels, [1]])).astype(int)
     rows = [slice(a, b) for a, b in pairwise(edges) if b - a >= _FEWEST_IN_BIN]

@@ -83,7 +83,7 @@ def fit_transformer(
     device: str = "cpu",
     progress: bool = True,
 ) -> tuple[Transformer, EnergyTransform]:
-    """Train a network on muons, the last twentieth of which validates.
+    """Train a network on muons, the last of which validate (`validation.training_rows`).
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ __all__ = ["split", "training_rows"]
 
 _FRACTION = 0.05
 _MOST = 500_000
-"""More would not decide better, and the networks hold a few kilobytes for each of them."""
+"""More would not decide better, and take a few kilobytes of memory each."""
 
 
 def training_rows(number: int) -> int:
@@ -20,6 +20,6 @@ def training_rows(number: int) -> int:
 
 
 def split(*columns: NDArray[Any]) -> tuple[list[NDArray[Any]], list[NDArray[Any]]]:
-    """Cut columns of one length in those that train and those that validate: decide when to stop and what to keep."""
+    """Cut columns of one length in rows that train and rows that validate, by which a fit stops and keeps weights."""
     cut = training_rows(len(columns[0]))
     return [np.ascontiguousarray(c[:cut]) for c in columns], [np.ascontiguousarray(c[cut:]) for c in columns]
