@@ -43,19 +43,18 @@ def main(cry: Path, more_cry: Path, samples: Path, work: Path) -> None:
     """Carry the raw muons, and compare what is there at each depth."""
     work.mkdir(parents=True, exist_ok=True)
     depths = sorted({round(model.depth_m) for model in list_models()})
-    head = ("depth", "rate", "to smoothed", "energy", "to smoothed", "smoothed: δ", *(f"{a}: δ" for a in ARCHITECTURES))
+    head = ("depth", "rate", "to smoothed", "energy", "to smoothed", "delta: smoothed", *ARCHITECTURES)
     rows: list[tuple[str, ...]] = [head]
     numbers = {}
     for depth, raw in carried(cry, more_cry, depths, work):
         smoothed = read_sample(samples / f"testing-{depth}m.h5")
-        energy, smoothed_energy = mean_energy(raw.muons), mean_energy(smoothed.muons)
+        rate, energy = (raw.rate, smoothed.rate), (mean_energy(raw.muons), mean_energy(smoothed.muons))
         found = {"smoothed": distances(smoothed.muons, raw.muons)}
         for name in ARCHITECTURES:
             found[name] = distances(Generator.open(depth, architecture=name).sample(GENERATED, seed=SEED), raw.muons)
-        numbers[depth] = {"rate": raw.rate, "smoothed_rate": smoothed.rate, "mean_energy": energy, **found}
-        rates = (f"{raw.rate:.3f}", f"{raw.rate / smoothed.rate:.4f}")
-        energies = (f"{energy:.3f}", f"{energy / smoothed_energy:.4f}")
-        rows.append((f"{depth} m", *rates, *energies, *(f"{of['delta']:.2%}" for of in found.values())))
+        numbers[depth] = {"rate": rate, "mean_energy": energy, "raw_muons": len(raw), **found}
+        pairs = [text for a, b in (rate, energy) for text in (f"{a:.3f}", f"{a / b:.3f}")]
+        rows.append((f"{depth} m", *pairs, *(f"{of['delta']:.2%}" for of in found.values())))
     write("raw_cry", {"generated": GENERATED, "depths": numbers}, rows)
 
 
