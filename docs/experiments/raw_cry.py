@@ -43,7 +43,7 @@ def main(cry: Path, more_cry: Path, samples: Path, work: Path) -> None:
     """Carry the raw muons, and compare what is there at each depth."""
     work.mkdir(parents=True, exist_ok=True)
     depths = sorted({round(model.depth_m) for model in list_models()})
-    head = ("depth", "rate", "to smoothed", "energy", "to smoothed", "delta: smoothed", *ARCHITECTURES)
+    head = ("depth", "rate", "ratio", "energy", "ratio", "smoothed", *ARCHITECTURES)
     rows: list[tuple[str, ...]] = [head]
     numbers = {}
     for depth, raw in carried(cry, more_cry, depths, work):
