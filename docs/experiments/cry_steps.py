@@ -23,6 +23,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
+from options import FILE
 from report import COLOURS, write
 from trained import SEED, trained
 
@@ -44,7 +45,6 @@ SLOW = 5
 STOPPED = (250, 500, 1000, 2000, 6000)
 """Steps after which training ends; the last one is that of the released models."""
 
-FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 Float = NDArray[np.float64]
 
 

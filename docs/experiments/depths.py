@@ -12,25 +12,23 @@ from pathlib import Path
 
 import click
 import numpy as np
-from judged import GENERATED
+from judged import GENERATED, distances
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from options import FOLDER
 from report import COLOURS, write
 from trained import SEED
 
 from deepmuon_runtime import Generator, Muons, list_models
-from deepmuon_training.histogram_scores import compare_cells, count_muons
-from deepmuon_training.kolmogorov_smirnov import kolmogorov_smirnov
 from deepmuon_training.plots import STYLE
-from deepmuon_training.sample import Sample, read_sample
+from deepmuon_training.sample import read_sample
 
 ENERGY_EDGES = 10.0 ** np.linspace(-2, 3.5, 56)
 COS_EDGES = np.linspace(0, 1, 41)
 COMPARED = (10, 50)
 """Depths [m] whose spectra are drawn."""
 
-FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
 Float = NDArray[np.float64]
 
 
@@ -51,7 +49,7 @@ def main(samples: Path, layered: Path) -> None:
         numbers[depth] = {
             "direct": moments(direct.muons, direct.rate),
             **{
-                name: moments(muons[name], generators[name].model.rate_hz_per_m2) | score(muons[name], direct)
+                name: moments(muons[name], generators[name].model.rate_hz_per_m2) | distances(muons[name], direct.muons)
                 for name in generators
             },
         }
@@ -74,20 +72,6 @@ def moments(muons: Muons, rate: float | None) -> dict[str, float | None]:
         "mean_box_cox": float(x.mean()),
         "mean_zenith": float(zenith.mean()),
         "mean_zenith_error": float(zenith.std() * scale),
-    }
-
-
-def score(muons: Muons, direct: Sample) -> dict[str, float | None]:
-    """Distances to the direct muons."""
-    cells = compare_cells(count_muons(muons), count_muons(direct.muons))
-    energy = kolmogorov_smirnov(muons.kinetic_energy, direct.muons.kinetic_energy)
-    cosine = kolmogorov_smirnov(muons.cos_zenith, direct.muons.cos_zenith)
-    return {
-        "chi2_ndf": cells.chi_square.per_ndf,
-        "delta": cells.delta,
-        "ks_energy": energy.distance,
-        "ks_cos_zenith": cosine.distance,
-        "ks_noise": energy.mean_noise,
     }
 
 

@@ -8,8 +8,10 @@ from trained import SEED
 
 from deepmuon_runtime import Generator, Muons
 from deepmuon_training.evaluate import evaluate
+from deepmuon_training.histogram_scores import compare_cells, count_muons
+from deepmuon_training.kolmogorov_smirnov import kolmogorov_smirnov
 
-__all__ = ["GENERATED", "Scores", "scores", "scores_of", "table"]
+__all__ = ["GENERATED", "Scores", "distances", "scores", "scores_of", "table"]
 
 GENERATED = 20_000_000
 
@@ -35,6 +37,19 @@ def scores(muons: Muons, truth: Muons, muons_per_draw: int = 1) -> Scores:
 def scores_of(generator: Generator, truth: Muons) -> Scores:
     """Compare twenty million muons of a generator with held-out ones."""
     return scores(generator.sample(GENERATED, seed=SEED), truth, generator.model.muons_per_draw)
+
+
+def distances(muons: Muons, truth: Muons) -> dict[str, float]:
+    """Compare muons with held-out ones on CRY's cells, by their energies and by their zenith angles, and no more."""
+    cells = compare_cells(count_muons(muons), count_muons(truth))
+    energy = kolmogorov_smirnov(muons.kinetic_energy, truth.kinetic_energy)
+    return {
+        "chi2_ndf": cells.chi_square.per_ndf,
+        "delta": cells.delta,
+        "ks_energy": energy.distance,
+        "ks_cos_zenith": kolmogorov_smirnov(muons.cos_zenith, truth.cos_zenith).distance,
+        "ks_noise": energy.mean_noise,
+    }
 
 
 def table(head: tuple[str, ...], results: Mapping[tuple[str, ...], Scores]) -> list[tuple[str, ...]]:

@@ -13,6 +13,7 @@ from pathlib import Path
 import click
 import torch
 from judged import GENERATED, scores, scores_of, table
+from options import FILE
 from report import write
 from trained import trained
 
@@ -21,8 +22,6 @@ from deepmuon_training.sample import read_cry, read_sample, write_sample
 from deepmuon_training.smoothing import StepSmoother, smoothed
 
 ARCHITECTURES = ("quantile", "transformer")
-
-FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 
 @click.command(help=__doc__)

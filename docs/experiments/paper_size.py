@@ -1,8 +1,10 @@
 """The paper's own size of network, d = 1024, beside the released models.
 
-deepmuon-train fit training-0m.h5 --architecture transformer -d 1024 --settings models/paper_size.toml -o paper.pt
-deepmuon-train export paper.pt -o paper.onnx
-python docs/experiments/paper_size.py paper.onnx --held-out testing-0m.h5
+    deepmuon-train fit training-0m.h5 --architecture transformer -d 1024 --settings models/paper_size.toml -o paper.pt
+    deepmuon-train export paper.pt -o paper.onnx
+    python docs/experiments/paper_size.py paper.onnx --held-out testing-0m.h5
+
+`models/make.py` leaves both samples in WORK/samples.
 """
 
 from __future__ import annotations
@@ -11,11 +13,10 @@ from pathlib import Path
 
 import click
 from judged import GENERATED, scores_of, table
+from options import FILE
 from report import write
 
 from deepmuon_runtime import Generator, read_muons
-
-FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 
 @click.command(help=__doc__)

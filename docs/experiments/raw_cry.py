@@ -15,13 +15,12 @@ from pathlib import Path
 
 import click
 import numpy as np
-from judged import GENERATED
+from judged import GENERATED, distances
+from options import FILE, FOLDER
 from report import write
 from trained import SEED
 
 from deepmuon_runtime import Generator, Muons, list_models
-from deepmuon_training.histogram_scores import compare_cells, count_muons
-from deepmuon_training.kolmogorov_smirnov import kolmogorov_smirnov
 from deepmuon_training.sample import HELD_OUT_CRY_MUONS, Sample, read_cry, read_sample, write_sample
 from deepmuon_training.transport import transport
 
@@ -30,15 +29,13 @@ DEEP = 30
 
 HELD_OUT_OF_MORE = 8_000_000
 ARCHITECTURES = ("quantile", "transformer")
-FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
-FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
 @click.command(help=__doc__)
 @click.option("--cry", required=True, type=FILE, help="CRY's muons at sea level, of which the last are held out.")
 @click.option("--more-cry", required=True, type=FILE, help="Those of the larger run.")
 @click.option("--samples", required=True, type=FOLDER, help="Where the smoothed held-out muons lie.")
-@click.option("--work", required=True, type=FOLDER, help="Folder for the raw ones.")
+@click.option("--work", required=True, type=click.Path(path_type=Path), help="Folder for the raw ones.")
 def main(cry: Path, more_cry: Path, samples: Path, work: Path) -> None:
     """Carry the raw muons, and compare what is there at each depth."""
     work.mkdir(parents=True, exist_ok=True)
@@ -76,14 +73,6 @@ def carried(cry: Path, more_cry: Path, depths: list[int], work: Path) -> Iterato
 def mean_energy(muons: Muons) -> float:
     """Return the mean kinetic energy [GeV]."""
     return float(muons.kinetic_energy.mean(dtype=np.float64))
-
-
-def distances(muons: Muons, raw: Muons) -> dict[str, float]:
-    """Compare with raw muons, on the cells of CRY's tables and by the energy."""
-    return {
-        "delta": compare_cells(count_muons(muons), count_muons(raw)).delta,
-        "ks_energy": kolmogorov_smirnov(muons.kinetic_energy, raw.kinetic_energy).distance,
-    }
 
 
 if __name__ == "__main__":

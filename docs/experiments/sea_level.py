@@ -9,15 +9,16 @@ from pathlib import Path
 
 import click
 import numpy as np
+from judged import GENERATED
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from report import COLOURS, write
+from trained import SEED
 
 from deepmuon_runtime import Generator, Muons, read_muons
 from deepmuon_training.plots import STYLE
 
-GENERATED = 20_000_000
 EDGES = 10.0 ** np.linspace(-2, 3, 51)
 FEWEST = 400  # muons in a bin that is judged
 ANGLES = {"all": (0.0, 90.0), "0° to 10°": (0.0, 10.0), "55° to 65°": (55.0, 65.0)}
@@ -32,7 +33,7 @@ def main(held_out: Path) -> None:
     """Compare the spectra of each range of zenith angles."""
     truth = read_muons(held_out)
     generators = {name: Generator.open(0, architecture=name) for name in ARCHITECTURES}
-    muons = {name: generator.sample(GENERATED, seed=1) for name, generator in generators.items()}
+    muons = {name: generator.sample(GENERATED, seed=SEED) for name, generator in generators.items()}
     numbers, rows = {}, [("zenith", "generator", "muons held out", "chi2 / bins", "rms deviation", "noise")]
     spectra = {}
     for angle, limits in ANGLES.items():

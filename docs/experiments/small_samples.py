@@ -21,6 +21,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from options import FILE
 from report import COLOURS, write
 from trained import SEED, trained
 
@@ -66,7 +67,6 @@ SHOWN = {
 }
 """Scores in the table, and how they are written; tails are relative to those of the held-out muons."""
 
-FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 Float = NDArray[np.float64]
 
 
