@@ -164,9 +164,9 @@ def _columns(stated: dict[str, Any]) -> Columns:
 def _read(path: Path, form: str, stated: dict[str, Any]) -> Sample:
     """Read the muons, with what is known of them."""
     from deepmuon_training.conversion import sample_of
+    from deepmuon_training.cry import read_cry
     from deepmuon_training.cry_text import read_cry_text
     from deepmuon_training.muon_table import read_csv, read_npy
-    from deepmuon_training.sample import read_cry
 
     if form == "cry-hdf5":
         return read_cry(path)

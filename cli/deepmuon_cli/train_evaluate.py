@@ -69,6 +69,7 @@ def command(
     from deepmuon_training.evaluate import FEWEST_MUONS, evaluate
     from deepmuon_training.report import html_report
     from deepmuon_training.sample import read_sample
+    from deepmuon_training.scorecard import markdown_scorecard
     from deepmuon_training.whole_file import write_whole
 
     generator, truth = Generator.open(file=model, device="cpu"), read_sample(held_out)
@@ -87,7 +88,7 @@ def command(
     if json_output is not None:
         write_whole(json_output, evaluation.to_json().encode(), overwrite=overwrite)
     if not quiet:
-        click.echo(evaluation.to_markdown(facts.architecture))
+        click.echo(markdown_scorecard(evaluation, facts.architecture))
         click.echo(f"{output}: {number:,} generated muons against {len(truth):,} of {held_out}, seed {seed}")
 
 

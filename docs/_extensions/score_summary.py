@@ -17,8 +17,8 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 from sphinx.util.typing import ExtensionMetadata
 
-from deepmuon_training.evaluate import Evaluation
-from deepmuon_training.scorecard import Score
+from deepmuon_training.evaluation import Evaluation
+from deepmuon_training.scorecard import Score, scorecard
 
 __all__ = ["setup"]
 
@@ -55,7 +55,7 @@ def _architecture_and_depth(file: Path) -> tuple[str, int]:
 
 
 def _row(file: Path) -> list[str]:
-    scores = Evaluation.from_json(file.read_text(encoding="utf-8")).scores(_architecture_and_depth(file)[0])
+    scores = scorecard(Evaluation.from_json(file.read_text(encoding="utf-8")), _architecture_and_depth(file)[0])
     judged = [score.met for score in scores if score.met is not None]
     values = [_value(scores, name) for name in COLUMNS.values()]
     return [file.stem.replace("-", " "), *values, f"{sum(judged)}/{len(judged)}"]

@@ -29,10 +29,10 @@ from trained import SEED, trained
 
 from deepmuon_runtime import Generator, Muons
 from deepmuon_training.architectures import Settings
+from deepmuon_training.cry import HELD_OUT_CRY_MUONS, read_cry
 from deepmuon_training.histogram_scores import compare_cells, count_muons
 from deepmuon_training.kolmogorov_smirnov import kolmogorov_smirnov
 from deepmuon_training.plots import STYLE
-from deepmuon_training.sample import HELD_OUT_CRY_MUONS, read_cry
 from deepmuon_training.smoothing import StepSmoother, smoothed
 from deepmuon_training.transformer_fit import TransformerSettings
 

@@ -10,6 +10,7 @@ from deepmuon_runtime import Generator, Muons
 from deepmuon_training.evaluate import evaluate
 from deepmuon_training.histogram_scores import compare_cells, count_muons
 from deepmuon_training.kolmogorov_smirnov import kolmogorov_smirnov
+from deepmuon_training.scorecard import scorecard
 
 __all__ = ["GENERATED", "Scores", "distances", "scores", "scores_of", "table"]
 
@@ -31,7 +32,7 @@ SHOWN = {
 def scores(muons: Muons, truth: Muons, muons_per_draw: int = 1) -> Scores:
     """Compare muons with held-out ones."""
     evaluation = evaluate(muons, truth, seed=SEED, muons_per_draw=muons_per_draw)
-    return {score.name.split(",")[0]: score.value for score in evaluation.scores()}
+    return {score.name.split(",")[0]: score.value for score in scorecard(evaluation)}
 
 
 def scores_of(generator: Generator, truth: Muons) -> Scores:

@@ -21,7 +21,8 @@ from report import write
 from trained import SEED
 
 from deepmuon_runtime import Generator, Muons, list_models
-from deepmuon_training.sample import HELD_OUT_CRY_MUONS, Sample, read_cry, read_sample, write_sample
+from deepmuon_training.cry import HELD_OUT_CRY_MUONS, read_cry
+from deepmuon_training.sample import Sample, read_sample, write_sample
 from deepmuon_training.transport import transport
 
 DEEP = 30

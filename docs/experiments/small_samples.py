@@ -27,12 +27,12 @@ from trained import SEED, trained
 
 from deepmuon_runtime import Generator, Muons, read_muons
 from deepmuon_training.architectures import Settings
+from deepmuon_training.cry_cells import COS_ZENITH_EDGES
 from deepmuon_training.fit import Schedule
 from deepmuon_training.histogram_scores import ENERGY_EDGES
 from deepmuon_training.plots import STYLE
 from deepmuon_training.quantile_fit import QuantileSchedules
 from deepmuon_training.sample import Sample, read_sample
-from deepmuon_training.smoothing import COS_ZENITH_EDGES
 from deepmuon_training.transformer_fit import TransformerSettings
 
 SMALL = 6_000

@@ -10,6 +10,7 @@ from deepmuon_runtime import Generator
 from deepmuon_runtime.model import Model
 from deepmuon_training.card import GENERAL_LIMITS, card, manifest_entry
 from deepmuon_training.evaluate import evaluate
+from deepmuon_training.scorecard import markdown_scorecard
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +57,7 @@ def test_a_card_shows_the_manifest_entry(text, model):
 
 
 def test_a_card_shows_the_scores_by_the_architectures_targets(text, evaluation, architecture):
-    assert evaluation.to_markdown(architecture) in text
+    assert markdown_scorecard(evaluation, architecture) in text
     assert "100000 generated muons against 100000 held-out ones" in text
 
 

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from deepmuon_runtime.muons import Muons
+from deepmuon_training.cry import CRY_SHOWER_VARIANCE, HELD_OUT_CRY_MUONS, read_cry
 from deepmuon_training.histogram_scores import compare_cells, compare_charge, count_muons
-from deepmuon_training.sample import CRY_SHOWER_VARIANCE, HELD_OUT_CRY_MUONS, Sample, read_cry
+from deepmuon_training.sample import Sample
 from deepmuon_training.smoothing import StepSmoother
 
 

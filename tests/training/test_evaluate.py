@@ -8,9 +8,10 @@ import pytest
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import MU_MINUS, Muons
-from deepmuon_training.evaluate import FEWEST_MUONS, Evaluation, evaluate
+from deepmuon_training.evaluate import FEWEST_MUONS, evaluate
+from deepmuon_training.evaluation import Evaluation
 from deepmuon_training.flux import sea_level_muons
-from deepmuon_training.scorecard import Score, judge
+from deepmuon_training.scorecard import Score, judge, markdown_scorecard, scorecard
 
 
 def no_number(text: str) -> float:
@@ -52,20 +53,20 @@ def faulty(truth) -> Evaluation:
 
 def test_a_clean_pair_raises_no_alarm(clean):
     # some 30 scores within 4 sigma and four 1 % levels: a false alarm in 25
-    for score in clean.scores():
+    for score in scorecard(clean):
         assert score.sigma is None or abs(score.sigma) < 4, score
         assert score.excess is None or score.excess < 0, score
     assert (clean.generated_muons, clean.held_out_muons) == (300_000, 200_000)
 
 
 def test_a_clean_pair_meets_every_target_that_its_size_can_tell(clean):
-    judged = [score for score in clean.scores("quantile") if score.target]
+    judged = [score for score in scorecard(clean, "quantile") if score.target]
     assert len(judged) > 20
     assert [score.name for score in judged if not score.met] == []
 
 
 def test_a_missed_target_is_reported_and_raises_nothing(faulty):
-    missed = {score.name for score in faulty.scores("quantile") if score.met is False}
+    missed = {score.name for score in scorecard(faulty, "quantile") if score.met is False}
     assert {
         "KS energy",
         "cells: delta",
@@ -76,7 +77,7 @@ def test_a_missed_target_is_reported_and_raises_nothing(faulty):
         "unphysical muons",
     } <= missed
     assert not {"KS u", "KS v"} & missed
-    assert "missed" in faulty.to_markdown("quantile")
+    assert "missed" in markdown_scorecard(faulty, "quantile")
 
 
 def test_unphysical_muons_are_counted_and_left_out(faulty):
@@ -98,22 +99,22 @@ def test_a_vertical_beam_of_one_charge_is_evaluated(truth):
     beam = Muons(beam.kinetic_energy, zero, zero, zero - 1, np.full_like(beam.pdg_id, MU_MINUS))
     evaluation = evaluate(beam, beam, seed=1)
     assert Evaluation.from_json(evaluation.to_json()) == evaluation
-    by_name = {score.name: score for score in evaluation.scores("quantile")}
+    by_name = {score.name: score for score in scorecard(evaluation, "quantile")}
     assert by_name["charge by cell: chi2/ndf"].met is None
-    assert "not measured" in evaluation.to_markdown("quantile")
+    assert "not measured" in markdown_scorecard(evaluation, "quantile")
 
 
 def test_the_table_has_a_row_for_each_score(clean):
-    lines = clean.to_markdown("quantile").splitlines()
-    assert len(lines) == 2 + len(clean.scores())
+    lines = markdown_scorecard(clean, "quantile").splitlines()
+    assert len(lines) == 2 + len(scorecard(clean))
     assert len({line.replace(r"\|", "").count("|") for line in lines}) == 1
     assert any(line.startswith("| KS energy | 0.00") and line.endswith("| excess ≤ 0.001 | met |") for line in lines)
 
 
 def test_an_architecture_is_judged_by_its_own_targets(clean):
-    targets = [score.target for score in clean.scores("transformer") if score.target]
+    targets = [score.target for score in scorecard(clean, "transformer") if score.target]
     assert targets == ["≤ 0.006"]
-    assert all(score.target is None for score in clean.scores())
+    assert all(score.target is None for score in scorecard(clean))
 
 
 @pytest.mark.parametrize(

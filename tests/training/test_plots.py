@@ -6,7 +6,8 @@ from math import log
 import pytest
 from matplotlib.image import imread
 
-from deepmuon_training.evaluate import Evaluation, evaluate
+from deepmuon_training.evaluate import evaluate
+from deepmuon_training.evaluation import Evaluation
 from deepmuon_training.flux import sea_level_muons
 from deepmuon_training.plots import draw_charge, draw_energy, draw_pictures, draw_zenith
 

@@ -10,9 +10,10 @@ from scipy.stats import ks_2samp
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import Muons
+from deepmuon_training.cry_cells import COS_ZENITH_EDGES, ENERGY_CELL
 from deepmuon_training.flux import sea_level_muons
 from deepmuon_training.sample import Sample
-from deepmuon_training.smoothing import COS_ZENITH_EDGES, ENERGY_CELL, StepSmoother
+from deepmuon_training.smoothing import StepSmoother
 from deepmuon_training.smoothing import smoothed as smoothed_sample
 
 N = 2_000_000

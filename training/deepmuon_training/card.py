@@ -9,7 +9,8 @@ from pathlib import Path
 import onnx
 
 from deepmuon_runtime.model import METADATA_PREFIX
-from deepmuon_training.evaluate import Evaluation
+from deepmuon_training.evaluation import Evaluation
+from deepmuon_training.scorecard import markdown_scorecard
 
 __all__ = ["GENERAL_LIMITS", "card", "manifest_entry"]
 
@@ -74,7 +75,7 @@ def card(model: Path, evaluation: Evaluation, *, command: str, provenance: Seque
             f"{generated} generated muons against {held_out} held-out ones, which trained nothing. *Alike samples* is "
             "what two samples of one distribution and these sizes show.",
             "",
-            evaluation.to_markdown(str(metadata["architecture"])),
+            markdown_scorecard(evaluation, str(metadata["architecture"])),
             "",
             "## Limits",
             "",

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import Muons
-from deepmuon_training.azimuth import AzimuthScore, compare_azimuth
-from deepmuon_training.chi_square import ChiSquare
-from deepmuon_training.classifier import ClassifierScore, classify
+from deepmuon_training.azimuth import compare_azimuth
+from deepmuon_training.classifier import classify
+from deepmuon_training.evaluation import Evaluation, Spectra
 from deepmuon_training.histogram_scores import (
-    Bin,
-    CellScore,
-    Counts,
-    TailScore,
     compare_cells,
     compare_charge,
     compare_energy_bins,
@@ -24,107 +19,19 @@ from deepmuon_training.histogram_scores import (
     compare_zenith_bins,
     count_muons,
 )
-from deepmuon_training.independence import Independence, measure_independence
-from deepmuon_training.kolmogorov_smirnov import KolmogorovSmirnov, kolmogorov_smirnov
-from deepmuon_training.records import from_json, to_json
-from deepmuon_training.scorecard import Score, judge, markdown_table, scorecard
+from deepmuon_training.independence import measure_independence
+from deepmuon_training.kolmogorov_smirnov import kolmogorov_smirnov
 from deepmuon_training.totals import (
-    ChargeRatio,
-    RateScore,
-    UnphysicalMuons,
     compare_charge_ratio,
     compare_rate,
     count_unphysical,
     is_physical,
 )
 
-__all__ = ["FEWEST_MUONS", "Evaluation", "Spectra", "evaluate"]
+__all__ = ["FEWEST_MUONS", "evaluate"]
 
 FEWEST_MUONS = 100_000
 """Physical muons that either sample must hold: the scores' noise is that of large samples."""
-
-
-@dataclass(frozen=True)
-class Spectra:
-    """Counts to draw, under- and overflow first and last where there are any.
-
-    Parameters
-    ----------
-    plus_by_energy, minus_by_energy : tuple of int, [52]
-        mu+ and mu- in the bins of `histogram_scores.ENERGY_EDGES`.
-    by_cos_zenith : tuple of int, [20]
-        Muons in bins of 0.05, from the horizon to the vertical.
-    """
-
-    plus_by_energy: tuple[int, ...]
-    minus_by_energy: tuple[int, ...]
-    by_cos_zenith: tuple[int, ...]
-
-    @classmethod
-    def of(cls, counts: Counts) -> Spectra:
-        """Sum the table of `histogram_scores.count_muons`."""
-        minus, plus = counts.sum(axis=2).tolist()
-        return cls(tuple(plus), tuple(minus), tuple(counts.sum(axis=(0, 1)).tolist()))
-
-
-@dataclass(frozen=True)
-class Evaluation:
-    """All scores of one generated set against one held-out set.
-
-    Parameters
-    ----------
-    generated_muons, held_out_muons : int
-        Physical muons that were compared.
-    muons_per_draw, seed : int
-        As given.
-    ks : dict of KolmogorovSmirnov
-        By column: "energy", "u", "v", "cos zenith".
-    cells : CellScore
-        On CRY's cells.
-    cells_against_raw : CellScore or None
-        The same against muons whose histogram steps were not taken out.
-    energy_bins, zenith_bins, tails, charge, charge_ratio, azimuth, classifier, independence, unphysical, rate
-        See their classes; rate is None where one is unknown.
-    generated_spectra, held_out_spectra : Spectra
-        What the pictures show.
-    """
-
-    generated_muons: int
-    held_out_muons: int
-    muons_per_draw: int
-    seed: int
-    ks: dict[str, KolmogorovSmirnov]
-    cells: CellScore
-    cells_against_raw: CellScore | None
-    energy_bins: tuple[Bin, ...]
-    zenith_bins: tuple[Bin, ...]
-    tails: tuple[TailScore, ...]
-    charge: ChiSquare
-    charge_ratio: ChargeRatio
-    azimuth: AzimuthScore
-    classifier: ClassifierScore
-    independence: Independence
-    unphysical: UnphysicalMuons
-    rate: RateScore | None
-    generated_spectra: Spectra
-    held_out_spectra: Spectra
-
-    def scores(self, architecture: str | None = None) -> tuple[Score, ...]:
-        """List the scores in short, judged by the targets of an architecture where it has any."""
-        return judge(scorecard(self), architecture)
-
-    def to_markdown(self, architecture: str | None = None) -> str:
-        """Write the scores in short as a Markdown table: value, noise, limit, verdict."""
-        return markdown_table(self.scores(architecture))
-
-    def to_json(self) -> str:
-        """Write everything as JSON."""
-        return to_json(self)
-
-    @classmethod
-    def from_json(cls, text: str) -> Evaluation:
-        """Read what `to_json` wrote."""
-        return from_json(cls, text)
 
 
 def evaluate(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from deepmuon_runtime.muons import Muons
 from deepmuon_training.chi_square import ChiSquare
-from deepmuon_training.smoothing import COS_ZENITH_EDGES
+from deepmuon_training.cry_cells import COS_ZENITH_EDGES
 
 __all__ = [
     "ENERGY_EDGES",

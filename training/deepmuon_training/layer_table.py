@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from deepmuon_runtime import read_attributes, read_muons
-from deepmuon_training.evaluate import Evaluation
+from deepmuon_training.evaluation import Evaluation
 from deepmuon_training.layer_steps import Layer
 from deepmuon_training.sample import read_sample
 

@@ -17,9 +17,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from deepmuon_training.evaluate import Evaluation, Spectra
+from deepmuon_training.cry_cells import COS_ZENITH_EDGES
+from deepmuon_training.evaluation import Evaluation, Spectra
 from deepmuon_training.histogram_scores import ENERGY_EDGES
-from deepmuon_training.smoothing import COS_ZENITH_EDGES
 
 __all__ = ["STYLE", "draw_charge", "draw_energy", "draw_pictures", "draw_zenith"]
 

@@ -10,11 +10,11 @@ from html import escape
 from matplotlib.figure import Figure
 
 from deepmuon_runtime.model import Model
-from deepmuon_training.evaluate import Evaluation
+from deepmuon_training.evaluation import Evaluation
 from deepmuon_training.histogram_scores import Bin
 from deepmuon_training.plots import draw_charge, draw_energy, draw_zenith
 from deepmuon_training.sample import Sample
-from deepmuon_training.scorecard import TABLE_HEAD, Score, table_rows
+from deepmuon_training.scorecard import TABLE_HEAD, Score, scorecard, table_rows
 
 __all__ = ["html_report"]
 
@@ -63,7 +63,7 @@ def html_report(evaluation: Evaluation, model: Model, held_out: Sample, held_out
     -------
     The same bytes for the same arguments.
     """
-    scores = evaluation.scores(model.architecture)
+    scores = scorecard(evaluation, model.architecture)
     title = f"{model.architecture}, {model.depth_m:g} m of {model.medium}"
     body = [
         f"<h1>{escape(title)}</h1>",

@@ -6,15 +6,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from math import hypot
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from deepmuon_training.chi_square import ChiSquare
+from deepmuon_training.evaluation import Evaluation
+from deepmuon_training.independence import Independence
 
-if TYPE_CHECKING:
-    from deepmuon_training.evaluate import Evaluation
-    from deepmuon_training.independence import Independence
-
-__all__ = ["TABLE_HEAD", "TARGETS", "Score", "Target", "judge", "markdown_table", "scorecard", "table_rows"]
+__all__ = ["TABLE_HEAD", "TARGETS", "Score", "Target", "judge", "markdown_scorecard", "scorecard", "table_rows"]
 
 _KS_SPREAD = 0.26 / 0.87  # standard deviation over mean of Kolmogorov's distribution
 
@@ -80,9 +78,9 @@ TARGETS: dict[str, tuple[Target, ...]] = {
 """What is asked of a released generator, by architecture. A missed target is reported, and raises nothing."""
 
 
-def scorecard(evaluation: Evaluation) -> tuple[Score, ...]:
-    """List the scores of an evaluation in short; of many alike (bins, lags, blocks) the worst."""
-    return tuple(_scores(evaluation))
+def scorecard(evaluation: Evaluation, architecture: str | None = None) -> tuple[Score, ...]:
+    """List the scores of an evaluation in short, judged; of many alike (bins, lags, blocks) the worst."""
+    return judge(_scores(evaluation), architecture)
 
 
 def judge(scores: Iterable[Score], architecture: str | None) -> tuple[Score, ...]:
@@ -94,19 +92,22 @@ def judge(scores: Iterable[Score], architecture: str | None) -> tuple[Score, ...
     )
 
 
+def markdown_scorecard(evaluation: Evaluation, architecture: str | None = None) -> str:
+    """Write the scores in short as a Markdown table: value, noise, limit, verdict."""
+    rows = [
+        [cell.replace("|", "\\|") for cell in row]
+        for row in (TABLE_HEAD, *table_rows(scorecard(evaluation, architecture)))
+    ]
+    lines = [f"| {' | '.join(row)} |" for row in rows]
+    return "\n".join([lines[0], "|---" * len(TABLE_HEAD) + "|", *lines[1:]]) + "\n"
+
+
 def table_rows(scores: Iterable[Score]) -> list[tuple[str, ...]]:
     """Write each score in the words of `TABLE_HEAD`."""
     return [
         (score.name, _number(score.value), _alike(score), _sigma(score), score.target or "", _verdict(score))
         for score in scores
     ]
-
-
-def markdown_table(scores: Iterable[Score]) -> str:
-    """Write scores as a Markdown table."""
-    rows = [[cell.replace("|", "\\|") for cell in row] for row in (TABLE_HEAD, *table_rows(scores))]
-    lines = [f"| {' | '.join(row)} |" for row in rows]
-    return "\n".join([lines[0], "|---" * len(TABLE_HEAD) + "|", *lines[1:]]) + "\n"
 
 
 def _scores(evaluation: Evaluation) -> Iterator[Score]:

@@ -21,15 +21,10 @@ from scipy.special import logit
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import Muons
+from deepmuon_training.cry_cells import COS_ZENITH_EDGES, ENERGY_CELL
 from deepmuon_training.sample import MINIMUM_ENERGY, Sample
 
-__all__ = ["COS_ZENITH_EDGES", "ENERGY_CELL", "StepSmoother", "smoothed"]
-
-ENERGY_CELL = 0.2
-"""Width of CRY's energy cells, in decades; their edges are the whole multiples of it in log10(E/GeV)."""
-
-COS_ZENITH_EDGES = np.linspace(0.0, 1.0, 21)
-"""Edges of CRY's cells in cos zenith."""
+__all__ = ["StepSmoother", "smoothed"]
 
 _LOWEST, _HIGHEST = -20, 25  # energy cells that are kept apart: 1e-4 GeV to 1e5 GeV
 _FEWEST_FOR_ANGLES = 1000  # muons under which energy cells share one distribution of angles

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from deepmuon_runtime.muons import Muons
+from deepmuon_training.cry_cells import COS_ZENITH_EDGES, ENERGY_CELL
 from deepmuon_training.plots import STYLE
-from deepmuon_training.smoothing import COS_ZENITH_EDGES, ENERGY_CELL
 
 __all__ = ["draw_smoothing"]
 
