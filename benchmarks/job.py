@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime import Generator, read_muons
-from deepmuon_runtime.latent import fill_latents
-from deepmuon_runtime.muon_file import COLUMNS
+from deepmuon_runtime.latents.philox import fill_latents
+from deepmuon_runtime.muon_file.file import COLUMNS
 from deepmuon_runtime.ordered_map import ordered_map
 
 __all__ = ["JOBS"]

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import torch
 
-from deepmuon_training.charge import ChargeProbability
-from deepmuon_training.condition import EnergyCondition
-from deepmuon_training.export import Training, export
-from deepmuon_training.flux import sea_level_muons
-from deepmuon_training.preprocessing import EnergyTransform
+from deepmuon_training.data.ecomug import sea_level_muons
+from deepmuon_training.energy_transform import EnergyTransform
+from deepmuon_training.export.onnx_export import Training, export
+from deepmuon_training.generators.transformer.model import ChargeTable, TransformerModel, radius_table
+from deepmuon_training.generators.transformer.network import Transformer
+from deepmuon_training.learning.charge import ChargeProbability
+from deepmuon_training.learning.condition import EnergyCondition
 from deepmuon_training.sample import Sample
-from deepmuon_training.transformer import Transformer
-from deepmuon_training.transformer_model import ChargeTable, TransformerModel, radius_table
 
 __all__ = ["write_paper_size"]
 

@@ -7,7 +7,7 @@ import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
 
-from deepmuon_training.geant4_data import without_data_sets
+from deepmuon_training.transport.geant4_data import without_data_sets
 
 sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
 os.environ.update(without_data_sets())  # for the modules that import geant4_pybind

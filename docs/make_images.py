@@ -15,8 +15,8 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from deepmuon_runtime import Generator, Muons
-from deepmuon_training.cry import HELD_OUT_CRY_MUONS, read_cry
-from deepmuon_training.smoothing import StepSmoother
+from deepmuon_training.data.cry import HELD_OUT_CRY_MUONS, read_cry
+from deepmuon_training.data.smoothing import StepSmoother
 from deepmuon_training.smoothing_plot import draw_smoothing
 
 IMAGES = Path(__file__).parent / "images"

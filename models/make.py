@@ -19,17 +19,17 @@ import click
 import torch
 
 from deepmuon_runtime import Generator
-from deepmuon_training.architectures import fit_generator
-from deepmuon_training.card import card, manifest_entry
-from deepmuon_training.cry import HELD_OUT_CRY_MUONS, read_cry
-from deepmuon_training.evaluate import evaluate
-from deepmuon_training.evaluation import Evaluation
-from deepmuon_training.fitted import export_fitted
-from deepmuon_training.plots import draw_pictures
+from deepmuon_training.data.cry import HELD_OUT_CRY_MUONS, read_cry
+from deepmuon_training.data.smoothing import StepSmoother, smoothed
+from deepmuon_training.generators.fit import fit_generator
+from deepmuon_training.generators.fitted import export_fitted
+from deepmuon_training.release.card import card, manifest_entry
+from deepmuon_training.release.vectors import muon_vectors
+from deepmuon_training.reports.pictures import draw_pictures
 from deepmuon_training.sample import Sample, read_sample, write_sample
-from deepmuon_training.smoothing import StepSmoother, smoothed
-from deepmuon_training.transport import transport
-from deepmuon_training.vectors import muon_vectors
+from deepmuon_training.scores.evaluate import evaluate
+from deepmuon_training.scores.evaluation import Evaluation
+from deepmuon_training.transport.slab import transport
 
 REPOSITORY = Path(__file__).parents[1]
 RELEASED = REPOSITORY / "models" / "deepmuon_models"

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
-from deepmuon_cli.ending import DEFECTIVE
-from deepmuon_cli.isolation import run_isolated, show_life
+from deepmuon_cli.process.ending import DEFECTIVE
+from deepmuon_cli.process.isolation import run_isolated, show_life
 
 if TYPE_CHECKING:  # the libraries are imported when they are needed: --help is answered at once
-    from deepmuon_runtime.check import Report
+    from deepmuon_runtime.muon_file.check import Report
 
 __all__ = ["check", "main"]
 
@@ -35,7 +35,7 @@ def check(context: click.Context, file: Path) -> None:
 
     Exit codes: 0 no defect, 3 a defect, 2 can't be read as a muon file.
     """  # noqa: D301 - click looks for the character \b
-    from deepmuon_runtime.check import check_file
+    from deepmuon_runtime.muon_file.check import check_file
 
     report = check_file(file, progress=lambda _: show_life())
     click.echo(f"{file}: {report.examined:,} muons examined")

@@ -9,7 +9,7 @@ from typing import NoReturn
 
 import click
 
-from deepmuon_cli.isolation import run_isolated, show_life
+from deepmuon_cli.process.isolation import run_isolated, show_life
 
 __all__ = ["csv", "main"]
 
@@ -41,8 +41,8 @@ def csv(file: Path, output: Path, units: str, no_header: bool, overwrite: bool) 
     for mu+. Nine digits keep every number as it is in the file.
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime.errors import RefusedError
-    from deepmuon_runtime.muon_text import csv_pieces
-    from deepmuon_runtime.whole_file import whole_file
+    from deepmuon_runtime.files.whole import whole_file
+    from deepmuon_runtime.views.text import csv_pieces
 
     pieces = (piece.encode() for piece in csv_pieces(file, unit=units, header=not no_header))
     if str(output) == "-":
@@ -63,8 +63,8 @@ def main() -> NoReturn:
 
 def _print(pieces: Iterator[bytes]) -> None:
     """Write to stdout, unbuffered: nothing is left to be written when its reader has gone."""
-    from deepmuon_runtime.damaged import reason
     from deepmuon_runtime.errors import FailedError
+    from deepmuon_runtime.muon_file.damage import reason
 
     try:
         with open(sys.stdout.fileno(), "wb", buffering=0, closefd=False) as stdout:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
-from deepmuon_cli.completion import architectures, depths, devices
-from deepmuon_cli.ending import run
-from deepmuon_cli.numbers import muon_number, positive_number, seed_number, shard_number
+from deepmuon_cli.options.completion import architectures, depths, devices
+from deepmuon_cli.options.quantities import muon_number, positive_number, seed_number, shard_number
+from deepmuon_cli.process.ending import run
 
 if TYPE_CHECKING:  # the libraries are imported when they are needed: --help is answered at once
     from deepmuon_runtime import Generator, Shard
@@ -127,8 +127,8 @@ def gen(
         raise click.UsageError("where to? Give the name of a file: -o muons.h5")
 
     from deepmuon_runtime import Generator, new_seed
-    from deepmuon_runtime.muon_file import check_output
-    from deepmuon_runtime.shard import WHOLE_RUN
+    from deepmuon_runtime.latents.shard import WHOLE_RUN
+    from deepmuon_runtime.muon_file.file import check_output
 
     check_output(output, overwrite)
     generator = Generator.open(depth, architecture, file=model, device=device, threads=threads)
@@ -170,7 +170,7 @@ def _check_number_options(number: int | None, live_time: float | None, area: flo
 
 
 def _print_models() -> None:
-    from deepmuon_runtime.released import default_architecture, list_models
+    from deepmuon_runtime.model.released import default_architecture, list_models
 
     default = default_architecture()
     click.echo("architecture   depth/m   rate/(1/m2/s)   muons/draw   size/kB")

@@ -7,7 +7,7 @@ from typing import NoReturn
 
 import click
 
-from deepmuon_cli.isolation import run_isolated, show_life
+from deepmuon_cli.process.isolation import run_isolated, show_life
 
 __all__ = ["main", "merge"]
 
@@ -39,7 +39,7 @@ def merge(shards: tuple[Path, ...], output: Path, overwrite: bool, virtual: bool
 
     Where a shard is missing HDF5 reads NaN, without an error; deepmuon-check names it.
     """  # noqa: D301 - click looks for the character \b
-    from deepmuon_runtime.merge import merge_shards
+    from deepmuon_runtime.muon_file.merge import merge_shards
 
     number = merge_shards(shards, output, overwrite=overwrite, virtual=virtual, progress=lambda _: show_life())
     if not quiet:

@@ -9,7 +9,7 @@ from typing import NoReturn
 
 import click
 
-from deepmuon_cli.isolation import run_isolated, show_life, take_time
+from deepmuon_cli.process.isolation import run_isolated, show_life, take_time
 
 __all__ = ["main", "plot"]
 
@@ -34,9 +34,9 @@ def plot(files: tuple[Path, ...], output: Path, overwrite: bool) -> None:
     shares of their muons. Needs matplotlib, which `pip install 'deepmuon-runtime[plot]'` brings.
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime.errors import RefusedError
-    from deepmuon_runtime.muon_file import check_output
-    from deepmuon_runtime.spectra import count_spectra
-    from deepmuon_runtime.whole_file import whole_file
+    from deepmuon_runtime.files.whole import whole_file
+    from deepmuon_runtime.muon_file.file import check_output
+    from deepmuon_runtime.views.spectra import count_spectra
 
     check_output(output, overwrite)
     form = output.suffix.lstrip(".").lower()
@@ -47,7 +47,7 @@ def plot(files: tuple[Path, ...], output: Path, overwrite: bool) -> None:
     spectra = [count_spectra(file, progress=lambda _: show_life()) for file in files]
     take_time()
 
-    from deepmuon_runtime.plot import draw_spectra
+    from deepmuon_runtime.views.plot import draw_spectra
 
     picture = BytesIO()
     draw_spectra(spectra).savefig(picture, format=form)

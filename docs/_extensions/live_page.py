@@ -18,7 +18,7 @@ from sphinx.util import logging
 from sphinx.util.typing import ExtensionMetadata
 
 from deepmuon_runtime import Model, list_models
-from deepmuon_runtime.released import default_architecture, read_released
+from deepmuon_runtime.model.released import default_architecture, read_released
 
 __all__ = ["setup"]
 

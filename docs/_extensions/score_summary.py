@@ -5,7 +5,7 @@
     ```{score-summary} evaluations
     ```
 
-The folder, relative to the page, holds NAME.json as `deepmuon_training.evaluate.Evaluation` writes it.
+The folder, relative to the page, holds NAME.json as `deepmuon_training.scores.evaluate.Evaluation` writes it.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 from sphinx.util.typing import ExtensionMetadata
 
-from deepmuon_training.evaluation import Evaluation
-from deepmuon_training.scorecard import Score, scorecard
+from deepmuon_training.scores.evaluation import Evaluation
+from deepmuon_training.scores.scorecard import Score, scorecard
 
 __all__ = ["setup"]
 

@@ -28,13 +28,13 @@ from report import COLOURS, write
 from trained import SEED, trained
 
 from deepmuon_runtime import Generator, Muons
-from deepmuon_training.architectures import Settings
-from deepmuon_training.cry import HELD_OUT_CRY_MUONS, read_cry
-from deepmuon_training.histogram_scores import compare_cells, count_muons
-from deepmuon_training.kolmogorov_smirnov import kolmogorov_smirnov
-from deepmuon_training.plots import STYLE
-from deepmuon_training.smoothing import StepSmoother, smoothed
-from deepmuon_training.transformer_fit import TransformerSettings
+from deepmuon_training.data.cry import HELD_OUT_CRY_MUONS, read_cry
+from deepmuon_training.data.smoothing import StepSmoother, smoothed
+from deepmuon_training.generators.fit import Settings
+from deepmuon_training.generators.transformer.fit import TransformerSettings
+from deepmuon_training.reports.pictures import STYLE
+from deepmuon_training.scores.histograms import compare_cells, count_muons
+from deepmuon_training.scores.kolmogorov_smirnov import kolmogorov_smirnov
 
 EDGES = 10.0 ** np.linspace(-0.6, 2.4, 151)
 """Ten bins to a cell of CRY's tables."""

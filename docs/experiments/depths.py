@@ -21,7 +21,7 @@ from report import COLOURS, write
 from trained import SEED
 
 from deepmuon_runtime import Generator, Muons, list_models
-from deepmuon_training.plots import STYLE
+from deepmuon_training.reports.pictures import STYLE
 from deepmuon_training.sample import read_sample
 
 ENERGY_EDGES = 10.0 ** np.linspace(-2, 3.5, 56)

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime.muons import MU_MINUS
-from deepmuon_training.preprocessing import box_cox, inverse_box_cox
+from deepmuon_training.energy_transform import box_cox, inverse_box_cox
 from deepmuon_training.sample import Sample, read_sample
-from deepmuon_training.transport import Transported, transport
+from deepmuon_training.transport.slab import Transported, transport
 
 RESULT = Path(__file__).with_suffix(".json")
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from trained import SEED
 
 from deepmuon_runtime import Generator, Muons
-from deepmuon_training.evaluate import evaluate
-from deepmuon_training.histogram_scores import compare_cells, count_muons
-from deepmuon_training.kolmogorov_smirnov import kolmogorov_smirnov
-from deepmuon_training.scorecard import scorecard
+from deepmuon_training.scores.evaluate import evaluate
+from deepmuon_training.scores.histograms import compare_cells, count_muons
+from deepmuon_training.scores.kolmogorov_smirnov import kolmogorov_smirnov
+from deepmuon_training.scores.scorecard import scorecard
 
 __all__ = ["GENERATED", "Scores", "distances", "scores", "scores_of", "table"]
 

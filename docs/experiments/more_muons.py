@@ -18,9 +18,9 @@ from report import write
 from trained import trained
 
 from deepmuon_runtime import Generator
-from deepmuon_training.cry import read_cry
+from deepmuon_training.data.cry import read_cry
+from deepmuon_training.data.smoothing import StepSmoother, smoothed
 from deepmuon_training.sample import read_sample, write_sample
-from deepmuon_training.smoothing import StepSmoother, smoothed
 
 ARCHITECTURES = ("quantile", "transformer")
 

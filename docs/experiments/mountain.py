@@ -18,14 +18,14 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from deepmuon_runtime import Generator, Muons
-from deepmuon_training.architectures import fit_generator
-from deepmuon_training.azimuth_fit import AZIMUTH_SCHEDULE
-from deepmuon_training.charge import CHARGE_SCHEDULE
-from deepmuon_training.fitted import FittedGenerator, export_fitted
-from deepmuon_training.flux import sea_level_muons
+from deepmuon_training.data.ecomug import sea_level_muons
+from deepmuon_training.generators.fit import fit_generator
+from deepmuon_training.generators.fitted import FittedGenerator, export_fitted
+from deepmuon_training.generators.quantile.azimuth_fit import AZIMUTH_SCHEDULE
+from deepmuon_training.generators.quantile.fit import QuantileSchedules
+from deepmuon_training.generators.quantile.regression import RegressionSteps
+from deepmuon_training.learning.charge import CHARGE_SCHEDULE
 from deepmuon_training.mountain import behind_mountain, skyline
-from deepmuon_training.quantile_fit import QuantileSchedules
-from deepmuon_training.quantile_regression import RegressionSteps
 from deepmuon_training.sample import Sample
 
 PICTURE = Path(__file__).parents[1] / "images" / "mountain.png"

@@ -21,9 +21,9 @@ from report import write
 from trained import SEED
 
 from deepmuon_runtime import Generator, Muons, list_models
-from deepmuon_training.cry import HELD_OUT_CRY_MUONS, read_cry
+from deepmuon_training.data.cry import HELD_OUT_CRY_MUONS, read_cry
 from deepmuon_training.sample import Sample, read_sample, write_sample
-from deepmuon_training.transport import transport
+from deepmuon_training.transport.slab import transport
 
 DEEP = 30
 """From this depth [m] on, the muons come from the larger run of CRY, of which the first eight million never trained."""

@@ -17,7 +17,7 @@ from report import COLOURS, write
 from trained import SEED
 
 from deepmuon_runtime import Generator, Muons, read_muons
-from deepmuon_training.plots import STYLE
+from deepmuon_training.reports.pictures import STYLE
 
 EDGES = 10.0 ** np.linspace(-2, 3, 51)
 FEWEST = 400  # muons in a bin that is judged

@@ -26,14 +26,14 @@ from report import COLOURS, write
 from trained import SEED, trained
 
 from deepmuon_runtime import Generator, Muons, read_muons
-from deepmuon_training.architectures import Settings
-from deepmuon_training.cry_cells import COS_ZENITH_EDGES
-from deepmuon_training.fit import Schedule
-from deepmuon_training.histogram_scores import ENERGY_EDGES
-from deepmuon_training.plots import STYLE
-from deepmuon_training.quantile_fit import QuantileSchedules
+from deepmuon_training.data.cry_cells import COS_ZENITH_EDGES
+from deepmuon_training.generators.fit import Settings
+from deepmuon_training.generators.quantile.fit import QuantileSchedules
+from deepmuon_training.generators.transformer.fit import TransformerSettings
+from deepmuon_training.learning.descent import Schedule
+from deepmuon_training.reports.pictures import STYLE
 from deepmuon_training.sample import Sample, read_sample
-from deepmuon_training.transformer_fit import TransformerSettings
+from deepmuon_training.scores.histograms import ENERGY_EDGES
 
 SMALL = 6_000
 REPETITIONS = 10

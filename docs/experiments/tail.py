@@ -21,8 +21,8 @@ from report import COLOURS, write
 from scipy.stats import kstest, poisson
 
 from deepmuon_runtime import Generator, Model, Muons
-from deepmuon_training.plots import STYLE
-from deepmuon_training.power_law import TAIL_MUONS
+from deepmuon_training.learning.power_law import TAIL_MUONS
+from deepmuon_training.reports.pictures import STYLE
 
 SEED = 1
 PROBABILITIES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)

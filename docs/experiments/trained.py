@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from deepmuon_runtime import Generator
-from deepmuon_training.architectures import Settings, fit_generator
-from deepmuon_training.fitted import export_fitted
+from deepmuon_training.generators.fit import Settings, fit_generator
+from deepmuon_training.generators.fitted import export_fitted
 from deepmuon_training.sample import Sample
 
 __all__ = ["SEED", "trained"]

@@ -16,8 +16,8 @@ from report import COLOURS, write
 from scipy.stats import kurtosis, skew
 
 from deepmuon_runtime import read_muons
-from deepmuon_training.plots import STYLE
-from deepmuon_training.preprocessing import EnergyTransform
+from deepmuon_training.energy_transform import EnergyTransform
+from deepmuon_training.reports.pictures import STYLE
 
 Float = NDArray[np.float64]
 

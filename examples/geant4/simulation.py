@@ -17,8 +17,8 @@ import geant4_pybind as g4
 import numpy as np
 
 from deepmuon_runtime import Generator, Muons
-from deepmuon_training.geant4_physics import MuonPhysics, NoSecondaries, initialize
-from deepmuon_training.geant4_source import MuonSource
+from deepmuon_training.transport.geant4_physics import MuonPhysics, NoSecondaries, initialize
+from deepmuon_training.transport.geant4_source import MuonSource
 
 EXIT_COLUMNS = ("x0", "y0", "u0", "v0", "w0", "x", "y", "z", "u", "v", "w", "energy")
 """Of a muon that leaves the block: place [m] and direction at the start and at the end, kinetic energy [GeV]."""

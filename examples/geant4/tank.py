@@ -26,7 +26,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from deepmuon_training.geant4_data import without_data_sets
+from deepmuon_training.transport.geant4_data import without_data_sets
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -2,16 +2,16 @@
 
 import os
 
-from deepmuon_runtime.check import Report, check_file
 from deepmuon_runtime.errors import DeepMuonError, FailedError, RefusedError
 from deepmuon_runtime.generator import Generator
-from deepmuon_runtime.latent import new_seed
-from deepmuon_runtime.merge import merge_shards
-from deepmuon_runtime.model import Model
-from deepmuon_runtime.muon_file import MuonWriter, read_attributes, read_muons, write_muons
+from deepmuon_runtime.latents.philox import new_seed
+from deepmuon_runtime.latents.shard import Shard
+from deepmuon_runtime.model.metadata import Model
+from deepmuon_runtime.model.released import list_models
+from deepmuon_runtime.muon_file.check import Report, check_file
+from deepmuon_runtime.muon_file.file import MuonWriter, read_attributes, read_muons, write_muons
+from deepmuon_runtime.muon_file.merge import merge_shards
 from deepmuon_runtime.muons import Muons
-from deepmuon_runtime.released import list_models
-from deepmuon_runtime.shard import Shard
 
 __all__ = [
     "DeepMuonError",

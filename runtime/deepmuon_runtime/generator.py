@@ -19,20 +19,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import FailedError, RefusedError, first_line
-from deepmuon_runtime.latent import checked_seed, fill_latents, new_seed
-from deepmuon_runtime.model import LATENTS_PER_MUON, Model
-from deepmuon_runtime.muon_file import BYTES_PER_MUON, MuonWriter, check_output
+from deepmuon_runtime.latents.philox import checked_seed, fill_latents, new_seed
+from deepmuon_runtime.latents.poisson import poisson
+from deepmuon_runtime.latents.shard import WHOLE_RUN, Shard
+from deepmuon_runtime.model.metadata import LATENTS_PER_MUON, Model
+from deepmuon_runtime.model.released import read_released, released_model
+from deepmuon_runtime.muon_file.file import BYTES_PER_MUON, MuonWriter, check_output
 from deepmuon_runtime.muons import MU_PLUS, Muons
 from deepmuon_runtime.ordered_map import ordered_map
 from deepmuon_runtime.physical import check_physical
-from deepmuon_runtime.poisson import poisson
-from deepmuon_runtime.released import read_released, released_model
-from deepmuon_runtime.shard import WHOLE_RUN, Shard
 
 if TYPE_CHECKING:
     import onnxruntime
 
-    from deepmuon_runtime.bound_run import BoundRun
+    from deepmuon_runtime.model.bound_run import BoundRun
 
 __all__ = ["LARGEST_NUMBER", "Generator", "checked_numbers"]
 
@@ -110,9 +110,9 @@ class Generator:
         RefusedError
             If there is no such model, it breaks the contract, or the device can't be had.
         """
-        from deepmuon_runtime.contract import check_signature, contract_metadata
-        from deepmuon_runtime.device import open_session
-        from deepmuon_runtime.onnx_file import check_onnx_file
+        from deepmuon_runtime.model.contract import check_signature, contract_metadata
+        from deepmuon_runtime.model.device import open_session
+        from deepmuon_runtime.model.onnx_file import check_onnx_file
 
         threads = _usable_processors() if threads is None else threads
         if threads < 1:
@@ -313,7 +313,7 @@ class Generator:
 
     def _thread_run(self) -> BoundRun:
         """Return the run of blocks that belongs to this thread."""
-        from deepmuon_runtime.bound_run import BoundRun
+        from deepmuon_runtime.model.bound_run import BoundRun
 
         if not hasattr(self._own, "run"):
             muons = self._block_draws * self.model.muons_per_draw
@@ -340,7 +340,7 @@ class Generator:
         muons = Muons.empty(len(latent) * self.model.muons_per_draw)
 
         def run() -> Outputs:
-            from deepmuon_runtime.contract import INPUT, OUTPUTS
+            from deepmuon_runtime.model.contract import INPUT, OUTPUTS
 
             energy, direction, charge = self._session.run(OUTPUTS, {INPUT: latent})
             if not len(energy) == len(direction) == len(charge) == len(muons):

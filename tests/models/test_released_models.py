@@ -9,7 +9,7 @@ import onnx
 import pytest
 
 from deepmuon_runtime import Generator, Model, list_models
-from deepmuon_runtime.released import default_architecture, read_released, released_model
+from deepmuon_runtime.model.released import default_architecture, read_released, released_model
 
 ARCHITECTURES = ("quantile", "transformer")
 DEPTHS = (0, 10, 20, 30, 40, 50)

@@ -23,7 +23,7 @@ from deepmuon_runtime import (
     read_attributes,
     read_muons,
 )
-from deepmuon_runtime.latent import latents
+from deepmuon_runtime.latents.philox import latents
 
 COLUMNS = ("kinetic_energy", "u", "v", "w", "pdg_id")
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from support.tiny_models import tiny_model
 
-from deepmuon_runtime.model import LARGEST_DRAW, LATENTS_PER_MUON
+from deepmuon_runtime.model.metadata import LARGEST_DRAW, LATENTS_PER_MUON
 
 # A process that is large itself, as this one may be, would pass its own peak on to its child.
 PEAK_OF_A_COMMAND = """

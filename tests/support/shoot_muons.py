@@ -11,8 +11,8 @@ from pathlib import Path
 import geant4_pybind as g4
 
 from deepmuon_runtime import Generator
-from deepmuon_training.geant4_physics import MuonPhysics, initialize
-from deepmuon_training.geant4_source import MuonSource
+from deepmuon_training.transport.geant4_physics import MuonPhysics, initialize
+from deepmuon_training.transport.geant4_source import MuonSource
 
 
 class World(g4.G4VUserDetectorConstruction):

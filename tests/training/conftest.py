@@ -13,19 +13,19 @@ from hypothesis import settings
 from numpy.typing import NDArray
 
 from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
-from deepmuon_training.charge import ChargeProbability, fit_charge
-from deepmuon_training.export import Exportable, Training, export
-from deepmuon_training.fit import Schedule
-from deepmuon_training.flux import plane_rate, sea_level_muons
-from deepmuon_training.preprocessing import EnergyTransform
-from deepmuon_training.quantile import QuantileGenerator
-from deepmuon_training.quantile_fit import QuantileSchedules, fit_quantile
-from deepmuon_training.quantile_regression import RegressionSteps
-from deepmuon_training.quantile_tables import QuantileTables, tabulate
+from deepmuon_training.data.ecomug import plane_rate, sea_level_muons
+from deepmuon_training.energy_transform import EnergyTransform
+from deepmuon_training.export.onnx_export import Exportable, Training, export
+from deepmuon_training.generators.quantile.fit import QuantileSchedules, fit_quantile
+from deepmuon_training.generators.quantile.maps import QuantileGenerator
+from deepmuon_training.generators.quantile.regression import RegressionSteps
+from deepmuon_training.generators.quantile.tables import QuantileTables, tabulate
+from deepmuon_training.generators.transformer.fit import TransformerSettings, fit_transformer
+from deepmuon_training.generators.transformer.model import ChargeTable, TransformerModel, radius_table
+from deepmuon_training.generators.transformer.network import Transformer
+from deepmuon_training.learning.charge import ChargeProbability, fit_charge
+from deepmuon_training.learning.descent import Schedule
 from deepmuon_training.sample import Sample
-from deepmuon_training.transformer import Transformer
-from deepmuon_training.transformer_fit import TransformerSettings, fit_transformer
-from deepmuon_training.transformer_model import ChargeTable, TransformerModel, radius_table
 
 settings.register_profile("unhurried", deadline=None)  # the processors may be busy
 settings.load_profile("unhurried")

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.muon_file import read_attributes
+from deepmuon_runtime.muon_file.file import read_attributes
 from deepmuon_runtime.muons import Muons
-from deepmuon_training.cry import CRY_SHOWER_VARIANCE, HELD_OUT_CRY_MUONS, read_cry
+from deepmuon_training.data.cry import CRY_SHOWER_VARIANCE, HELD_OUT_CRY_MUONS, read_cry
 from deepmuon_training.sample import Sample, read_sample, write_sample
 
 MUONS = Muons.of([1.0, 0.002, 300.0], [0.0, 0.6, 0.0], [0.0, 0.0, -0.6], [-1.0, -0.8, -0.8], [13, -13, 13])

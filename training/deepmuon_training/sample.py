@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from deepmuon_runtime.muon_file import read_attributes, read_muons, write_muons
+from deepmuon_runtime.muon_file.file import read_attributes, read_muons, write_muons
 from deepmuon_runtime.muons import Muons
 
 __all__ = [

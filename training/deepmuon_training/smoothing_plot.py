@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from deepmuon_runtime.muons import Muons
-from deepmuon_training.cry_cells import COS_ZENITH_EDGES, ENERGY_CELL
-from deepmuon_training.plots import STYLE
+from deepmuon_training.data.cry_cells import COS_ZENITH_EDGES, ENERGY_CELL
+from deepmuon_training.reports.pictures import STYLE
 
 __all__ = ["draw_smoothing"]
 
@@ -27,7 +27,7 @@ def draw_smoothing(raw: Muons, smoothed: Muons) -> Figure:
     Parameters
     ----------
     raw, smoothed
-        The same muons, as CRY made them and after `deepmuon_training.smoothing.StepSmoother`.
+        The same muons, as CRY made them and after `deepmuon_training.data.smoothing.StepSmoother`.
     """
     near = (raw.kinetic_energy > 10 ** _SLICE[0]) & (raw.kinetic_energy < 10 ** _SLICE[1])
     near_smoothed = (smoothed.kinetic_energy > 10 ** _SLICE[0]) & (smoothed.kinetic_energy < 10 ** _SLICE[1])

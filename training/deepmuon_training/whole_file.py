@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from deepmuon_runtime.whole_file import whole_file
+from deepmuon_runtime.files.whole import whole_file
 
 __all__ = ["write_whole"]
 
@@ -15,14 +15,14 @@ def write_whole(path: str | Path, contents: bytes, *, overwrite: bool = False) -
     Parameters
     ----------
     path, overwrite
-        As for `deepmuon_runtime.whole_file.whole_file`.
+        As for `deepmuon_runtime.files.whole.whole_file`.
     contents
         All of the file.
 
     Raises
     ------
     RefusedError, FailedError
-        As `deepmuon_runtime.whole_file.whole_file` raises them.
+        As `deepmuon_runtime.files.whole.whole_file` raises them.
     """
     with whole_file(path, overwrite=overwrite) as file:
         file.write(contents)

@@ -1,0 +1,158 @@
+"""How a command ends: its exit code, and one line that says why.
+
+=====  ===========================================================================================
+0      done
+1      failed while running: disk full, the model gave a bad muon, lost a race for the output,
+       stdout not written to its end
+2      refused before anything started: bad arguments, no such depth, bad input, output exists
+3      `deepmuon-check` found a defect
+129    stopped by SIGHUP: the terminal or the connection was closed
+130    stopped by Ctrl-C
+143    stopped by SIGTERM
+128+n  ended by another signal, of number n
+=====  ===========================================================================================
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from types import FrameType
+from typing import Any, NoReturn
+
+import click
+
+from deepmuon_cli.process.stdout import watched_stdout
+
+__all__ = ["DEFECTIVE", "REFUSED", "SIGNALS", "complain", "run"]
+
+FAILED = 1
+REFUSED = 2
+DEFECTIVE = 3
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+MOMENT = 0.02  # s, after which a signal that got lost comes again
+
+
+def run(command: click.Command, name: str) -> NoReturn:
+    """Run a command on the arguments of the process, and end the process.
+
+    Parameters
+    ----------
+    command
+        What to run.
+    name
+        What the user typed to start it.
+    """
+    warnings.showwarning = lambda message, *_, **__: _say(f"{name}: warning:", message, "yellow")
+    code, reason = _Stopping().outcome(lambda: _outcome(command, name))
+    if reason:
+        complain(name, reason)
+    sys.exit(code)
+
+
+def complain(name: str, reason: str) -> None:
+    """Write the line that says why a command does not end with 0."""
+    _say(f"{name}:", reason, "red")
+
+
+def _say(beginning: str, message: object, colour: str) -> None:
+    """Write a line to stderr; click leaves the colour out where that is no terminal."""
+    with suppress(OSError):  # a terminal that was closed, a full disk: the exit code has to do
+        click.echo(f"{click.style(beginning, fg=colour)} {_printable(message)}", err=True)
+
+
+def _printable(message: object) -> str:
+    """Return a text whose control characters, which a stranger's file may bring, are escaped."""
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in str(message))
+
+
+class _Stopped(BaseException):
+    """A signal asked the process to end."""
+
+    def __init__(self, lost: Callable[[], None]) -> None:
+        super().__init__()
+        self._lost = lost
+
+    def __del__(self) -> None:
+        self._lost()
+
+
+class _Stopping:
+    """Turns a signal into an exception in the main thread, so that temporary files are removed on its way.
+
+    A second signal does not disturb that. But Python drops an exception that is raised while an object is
+    destroyed, and a library may drop one that is raised in its callback. An exception that was dropped is
+    destroyed before it arrived: then the signal comes again a moment later.
+    """
+
+    def __init__(self) -> None:
+        self._number: int | None = None  # the first signal
+        self._is_quiet = False  # an exception is on its way, or all is done
+        self._is_done = False
+        self._report_unraisable = sys.unraisablehook
+
+    def outcome(self, function: Callable[[], tuple[int, str]]) -> tuple[int, str]:
+        """Return what a function returns, or the exit code and the reason of a stop."""
+        try:
+            self._begin()
+            result = function()
+            self._end()
+            return result
+        except BaseException:
+            self._end()
+            if self._number is None:
+                raise
+            return 128 + self._number, f"stopped by {signal.Signals(self._number).name}"
+
+    def _begin(self) -> None:
+        sys.unraisablehook = self._unraisable
+        for number in SIGNALS:
+            if signal.getsignal(number) is not signal.SIG_IGN:  # as for a job in the background, or of nohup
+                signal.signal(number, self._stop)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+
+    def _end(self) -> None:
+        self._is_quiet = self._is_done = True
+        signal.setitimer(signal.ITIMER_REAL, 0)
+
+    def _stop(self, number: int, frame: FrameType | None) -> None:
+        if self._is_quiet:
+            return
+        self._is_quiet = True
+        if self._number is None:
+            self._number = number
+            signal.signal(signal.SIGALRM, self._stop)
+        raise _Stopped(self._lost)
+
+    def _lost(self) -> None:
+        if not self._is_done:
+            self._is_quiet = False
+            signal.setitimer(signal.ITIMER_REAL, MOMENT)
+
+    def _unraisable(self, unraisable: Any) -> None:
+        if not isinstance(unraisable.exc_value, _Stopped):
+            self._report_unraisable(unraisable)
+
+
+def _outcome(command: click.Command, name: str) -> tuple[int, str]:
+    """Return the exit code, and the reason where there is one."""
+    try:
+        with watched_stdout():
+            code = command.main(prog_name=name, standalone_mode=False)  # that of click.Context.exit, or None
+    except click.ClickException as error:
+        if isinstance(error, click.NoSuchOption) and error.possibilities:
+            del error.possibilities[1:]  # after the nearest come distant ones
+        return REFUSED, " ".join(error.format_message().split())
+    except OSError as error:  # a folder that vanished at that moment
+        return FAILED, str(error)
+    except Exception as error:
+        from deepmuon_runtime.errors import FailedError, RefusedError
+
+        if isinstance(error, (FailedError, RefusedError)):
+            return (REFUSED if isinstance(error, RefusedError) else FAILED), str(error)
+        raise
+    return code or 0, ""

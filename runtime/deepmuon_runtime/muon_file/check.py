@@ -1,0 +1,256 @@
+"""Whether a muon file keeps its format, and whether what it holds are muons."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from zlib import crc32
+
+import h5py
+import numpy as np
+
+from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.model.metadata import Model
+from deepmuon_runtime.model.released import list_models
+from deepmuon_runtime.muon_file.attributes import attribute_defects, is_generated, sound_attributes
+from deepmuon_runtime.muon_file.checksum import unlike
+from deepmuon_runtime.muon_file.damage import READ_ERRORS, member, reason
+from deepmuon_runtime.muon_file.file import CHECKSUM, COLUMNS, check_format, python_value
+from deepmuon_runtime.muon_file.virtual import VirtualColumn, opened_source
+from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
+from deepmuon_runtime.physical import POSITIVE_ENERGIES, describe, find_unphysical
+
+__all__ = ["Report", "check_file"]
+
+PIECE = 1 << 17  # muons read at once
+
+
+@dataclass
+class Report:
+    """What a check found.
+
+    Attributes
+    ----------
+    defects : list of str
+        What is wrong, a line each; none if the file is good.
+    attributes : dict
+        The attributes of the format whose values are what they can be.
+    model : Model or None
+        The released model that made the muons, if it was one.
+    examined : int
+        Muons that were read and counted below.
+    mu_plus, mu_minus : int
+        How many of each.
+    mean_energy : float
+        Mean kinetic energy in GeV; NaN if there is none.
+    mean_cos_zenith : float
+        Mean cosine of the zenith angle; NaN if there is none.
+    """
+
+    defects: list[str] = field(default_factory=list)
+    attributes: dict[str, Any] = field(default_factory=dict)
+    model: Model | None = None
+    examined: int = 0
+    mu_plus: int = 0
+    mu_minus: int = 0
+    energy_sum: float = 0.0
+    cos_zenith_sum: float = 0.0
+
+    @property
+    def mean_energy(self) -> float:  # noqa: D102 - above
+        return self.energy_sum / self.examined if self.examined else float("nan")
+
+    @property
+    def mean_cos_zenith(self) -> float:  # noqa: D102 - above
+        return self.cos_zenith_sum / self.examined if self.examined else float("nan")
+
+    def add(self, muons: Muons) -> None:
+        """Count muons."""
+        self.examined += len(muons)
+        self.mu_plus += int(np.count_nonzero(muons.pdg_id == MU_PLUS))
+        self.mu_minus += int(np.count_nonzero(muons.pdg_id == MU_MINUS))
+        with np.errstate(all="ignore"):  # the file may hold anything
+            self.energy_sum += float(muons.kinetic_energy.sum(dtype=float))
+            self.cos_zenith_sum += float(muons.cos_zenith.sum(dtype=float))
+
+
+def check_file(path: str | Path, progress: Callable[[int], object] = lambda _: None) -> Report:
+    """Check a muon file against its format, and each of its muons.
+
+    The muons are read in pieces: the memory needed does not grow with their number. HDF5 can end the process, or
+    never return, on a damaged file; the command `deepmuon-check` survives that.
+
+    Parameters
+    ----------
+    path
+        A muon file, format version 1.
+    progress
+        Called again and again with the number of muons read since the last call.
+
+    Raises
+    ------
+    RefusedError
+        If the file can't be opened, or is no muon file of this version.
+    """
+    if Path(path).exists() and not Path(path).is_file():  # a pipe would be waited for
+        raise RefusedError(f"{path} is no file")
+    try:
+        with h5py.File(path, "r") as file:
+            check_format(file, path)
+            return _report(file, progress)
+    except READ_ERRORS as error:
+        raise RefusedError(f"{path} can't be read as a muon file: {reason(error)}") from error
+
+
+def _report(file: h5py.File, progress: Callable[[int], object]) -> Report:
+    report = Report()
+    group = member(file, "muons")
+    if not isinstance(group, h5py.Group):
+        report.defects.append("there is no group /muons")
+        return report
+    attributes = _read_attributes(group, "/muons", report.defects)
+    if is_generated(attributes):
+        report.model = _released_model(attributes.get("model_sha256"))
+    report.attributes = sound_attributes(attributes)
+    report.defects += attribute_defects(attributes, report.model)
+    columns = _sound_columns(group, report.attributes.get("count"), report.defects, progress)
+    if len(columns) == len(COLUMNS) and len({len(column) for column in columns.values()}) == 1:
+        _examine_muons(columns, report, progress)
+    else:
+        report.defects.append("the muons were not examined, because the columns are not sound")
+    return report
+
+
+def _read_attributes(node: h5py.HLObject, name: str, defects: list[str]) -> dict[str, Any]:
+    try:
+        return {key: python_value(value) for key, value in node.attrs.items()}
+    except READ_ERRORS as error:
+        defects.append(f"the attributes of {name} can't be read: {reason(error)}")
+        return {}
+
+
+def _released_model(sha256: object) -> Model | None:
+    return next((model for model in list_models() if model.sha256 == sha256), None)
+
+
+def _sound_columns(
+    group: h5py.Group, count: int | None, defects: list[str], progress: Callable[[int], object]
+) -> dict[str, _Column]:
+    """Return the columns that can be read as the format's, and note the defects of all."""
+    sound = {}
+    for name, (_, units) in COLUMNS.items():
+        column = member(group, name)
+        if not isinstance(column, h5py.Dataset):
+            defects.append(f"the column {name} is missing")
+            continue
+        try:
+            found = list(_column_defects(column, name, progress))
+        except READ_ERRORS as error:
+            found = [f"can't be read: {reason(error)}"]
+        attributes = _read_attributes(column, name, defects)
+        checksum = attributes.get(CHECKSUM)
+        if not found:
+            sound[name] = _Column(VirtualColumn(column, progress) if column.is_virtual else column, checksum)
+        if not found and count is not None and len(column) != count:
+            found = [f"has {len(column)} muons, and the attribute count is {count}"]
+        if attributes.get("units") != units:
+            found.append(f"has the units {attributes.get('units')!r}, and should have {units!r}")
+        if not isinstance(checksum, int):
+            found.append(f"has the checksum {checksum!r}, and should have a number, its CRC-32")
+        defects += (f"the column {name} {defect}" for defect in found)
+    return sound
+
+
+def _column_defects(column: h5py.Dataset, name: str, progress: Callable[[int], object]) -> Iterator[str]:
+    """Yield what keeps a column from being read."""
+    dtype = COLUMNS[name][0]
+    if column.dtype != dtype or column.ndim != 1:
+        yield f"is {column.dtype} of shape {column.shape}, and should be {dtype} of one dimension"
+    elif column.is_virtual:
+        yield from _source_defects(VirtualColumn(column), name, progress)
+    elif column.external:
+        yield "keeps its numbers in a file that is not HDF5"
+    elif column.chunks is None:
+        if column.id.get_storage_size() != column.nbytes:
+            yield f"holds {column.id.get_storage_size()} of its {column.nbytes} bytes"
+    elif column.id.get_num_chunks() != -(-len(column) // column.chunks[0]):
+        yield f"holds {column.id.get_num_chunks()} of its {-(-len(column) // column.chunks[0])} chunks"
+
+
+def _source_defects(column: VirtualColumn, name: str, progress: Callable[[int], object]) -> Iterator[str]:
+    """Yield the first of the sources that can't be read, and how many others can't."""
+    defects = []
+    for source in column.sources:
+        progress(0)
+        try:
+            with opened_source(source) as stored:
+                defects += [f"its source {source.path} {defect}" for defect in _column_defects(stored, name, progress)]
+        except OSError as error:
+            defects.append(reason(error))
+    if defects:
+        yield f"can't be read: {defects[0]}" + (f", and {len(defects) - 1} others" if len(defects) > 1 else "")
+
+
+@dataclass
+class _Column:
+    """A column that can be read, and its CRC-32 by its attribute and by what was read of it so far."""
+
+    stored: h5py.Dataset | VirtualColumn
+    expected: int | None
+    found: int = 0
+
+    def read(self, span: slice) -> Any:
+        """Return the next muons' values."""
+        values = self.stored[span]
+        self.found = crc32(values.data, self.found)
+        return values
+
+    def __len__(self) -> int:
+        return len(self.stored)
+
+
+def _examine_muons(columns: dict[str, _Column], report: Report, progress: Callable[[int], object]) -> None:
+    """Read all muons and note, for each fault, the first that has it and how many have."""
+    model = report.model
+    energies = POSITIVE_ENERGIES if model is None else (model.energy_min_gev, model.energy_max_gev)
+    faults: dict[str, _Fault] = {}
+    total = len(columns["pdg_id"])
+    for first in range(0, total, PIECE):
+        span = slice(first, min(first + PIECE, total))
+        try:
+            muons = Muons(**{name: column.read(span) for name, column in columns.items()})
+        except READ_ERRORS as error:
+            report.defects.append(f"the muons from {first} on can't be read: {reason(error)}")
+            break
+        report.add(muons)
+        for fault, bad in find_unphysical(muons, *energies).items():
+            index = int(np.argmax(bad))
+            known = faults.setdefault(fault, _Fault(first + index, describe(muons, index)))
+            known.count += int(np.count_nonzero(bad))
+        progress(len(muons))
+    else:
+        report.defects += _checksum_defects(columns)
+    report.defects += (f"muon {known.first} {fault} ({known.muon}){known.others}" for fault, known in faults.items())
+
+
+def _checksum_defects(columns: dict[str, _Column]) -> Iterator[str]:
+    """Yield which columns, read to their end, are not what was written."""
+    for name, column in columns.items():
+        if isinstance(column.expected, int) and column.found != column.expected:
+            where = " (or one of its sources)" if isinstance(column.stored, VirtualColumn) else ""
+            yield f"the column {name}{where} {unlike(column.found, column.expected)}"
+
+
+@dataclass
+class _Fault:
+    """What is wrong with some muons."""
+
+    first: int
+    muon: str
+    count: int = 0
+
+    @property
+    def others(self) -> str:
+        return f"; so {self.count} muons" if self.count > 1 else ""

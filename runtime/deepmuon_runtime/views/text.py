@@ -1,0 +1,57 @@
+"""Muons as text, one a line, for programs that read no HDF5."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.muon_file.file import read_pieces
+from deepmuon_runtime.muons import Muons
+
+__all__ = ["UNITS", "csv_pieces"]
+
+UNITS = {"GeV": 1.0, "MeV": 1e3}
+"""Each unit of energy in a GeV."""
+
+PIECE = 1 << 15  # muons turned into text at once
+
+LINE = "%.9g,%.9g,%.9g,%.9g,%d\n"  # nine digits tell any two float32 numbers apart
+
+
+def csv_pieces(path: str | Path, *, unit: str = "GeV", header: bool = True) -> Iterator[str]:
+    """Read a muon file as comma-separated text, in pieces of whole lines.
+
+    A line holds kinetic energy, u, v, w and pdg_id; read as float32 numbers, and in GeV, they are those of the file.
+
+    Parameters
+    ----------
+    path
+        A muon file, format version 1. The memory needed does not grow with its size.
+    unit
+        Unit of the energy, one of `UNITS`.
+    header
+        Whether the first line names the columns: kinetic_energy_GeV,u,v,w,pdg_id.
+
+    Raises
+    ------
+    RefusedError
+        If the file can't be read or is no muon file, or there is no such unit.
+    """
+    if unit not in UNITS:
+        raise RefusedError(f"there is no unit {unit!r}: energies are in {' or '.join(UNITS)}")
+    pieces = read_pieces(path, PIECE)
+    first = next(pieces, Muons.empty(0))
+    if header:
+        yield f"kinetic_energy_{unit},u,v,w,pdg_id\n"
+    for muons in chain([first], pieces):
+        yield _lines(muons, UNITS[unit])
+
+
+def _lines(muons: Muons, factor: float) -> str:
+    energy = muons.kinetic_energy.astype(np.float64) * factor
+    rows = np.stack([energy, muons.u, muons.v, muons.w, muons.pdg_id], axis=1)
+    return LINE * len(muons) % tuple(rows.ravel().tolist())

@@ -1,0 +1,168 @@
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from deepmuon_runtime import Generator
+from deepmuon_runtime.errors import RefusedError
+from deepmuon_training.generators.fit import fit_generator
+from deepmuon_training.generators.fitted import FittedGenerator, export_fitted
+from deepmuon_training.generators.quantile.fit import QuantileSchedules
+from deepmuon_training.generators.quantile.regression import RegressionSteps
+from deepmuon_training.generators.transformer.fit import TransformerSettings
+from deepmuon_training.learning.descent import Schedule
+
+CHARGE = Schedule(steps=10, learning_rate=0.02, averaging=0.5, validate_every=5)
+TINY = {
+    "quantile": QuantileSchedules(zenith=RegressionSteps(adam=20, round=5, rounds=1), charge=CHARGE),
+    "transformer": TransformerSettings(
+        d=16, batch=512, directions=4, schedule=replace(CHARGE, learning_rate=1e-3), charge=CHARGE, calibration=100_000
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def few(sample):
+    return replace(sample, muons=sample.muons[:5000])
+
+
+@pytest.fixture(scope="module")
+def fitted(architecture, few) -> FittedGenerator:
+    return fit_generator(few, architecture, seed=3, settings=TINY[architecture], progress=False)
+
+
+def digest(path):
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def test_a_fit_is_exported_as_a_model_that_gives_muons(fitted, architecture, tmp_path):
+    exported = export_fitted(fitted, tmp_path / "model.onnx")
+    generator = Generator.open(file=tmp_path / "model.onnx", device="cpu", threads=1)
+    assert len(generator.sample(10_000, seed=1)) == 10_000
+    assert generator.model.architecture == architecture
+    assert generator.model.metadata["training_seed"] == "3"
+    assert generator.model.metadata["training_muons"] == "5000"
+    assert exported.mismatch.energy < 1e-4
+    assert any("ONNX Runtime differs from PyTorch" in note for note in exported.notes)
+
+
+def test_what_was_saved_and_loaded_is_exported_as_the_same_bytes(fitted, tmp_path):
+    fitted.save(tmp_path / "generator.pt")
+    loaded = FittedGenerator.load(tmp_path / "generator.pt")
+    export_fitted(fitted, tmp_path / "a.onnx")
+    export_fitted(loaded, tmp_path / "b.onnx")
+    assert digest(tmp_path / "a.onnx") == digest(tmp_path / "b.onnx")
+    assert loaded.training == fitted.training
+    assert loaded.settings == fitted.settings
+    assert loaded.notes == fitted.notes
+    assert loaded.unphysical_before_mapping == fitted.unphysical_before_mapping
+
+
+def test_the_same_fit_is_saved_as_the_same_bytes_under_any_name(fitted, tmp_path):
+    for name in ("a.pt", "b.pt"):
+        fitted.save(tmp_path / name)
+    assert digest(tmp_path / "a.pt") == digest(tmp_path / "b.pt")
+
+
+def test_a_saved_generator_says_what_training_was(fitted, few, architecture, tmp_path):
+    fitted.save(tmp_path / "generator.pt")
+    training = FittedGenerator.load(tmp_path / "generator.pt").training
+    assert (training.source, training.provenance) == (few.source, few.provenance)
+    assert (training.rate, training.depth_m, training.medium) == (few.rate, few.depth_m, few.medium)
+    assert (training.muons, training.seed) == (len(few), 3)
+    assert fitted.settings["charge"]["steps"] == 10
+
+
+def test_a_saved_generator_is_replaced_only_if_wanted(fitted, tmp_path):
+    path = tmp_path / "generator.pt"
+    fitted.save(path)
+    with pytest.raises(RefusedError, match="exists already"):
+        fitted.save(path)
+    fitted.save(path, overwrite=True)
+    assert [p.name for p in tmp_path.iterdir()] == ["generator.pt"]
+
+
+class Harmful:
+    def __reduce__(self):
+        return print, ("executed",)
+
+
+@pytest.mark.parametrize("content", [b"", b"no generator", b"PK\x03\x04", None, {"format": "other"}, [1], Harmful()])
+def test_a_file_that_is_no_generator_is_refused(tmp_path, content, capsys):
+    path = tmp_path / "generator.pt"
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    elif content is not None:
+        torch.save(content, path)
+    with pytest.raises(RefusedError, match="is no generator that deepmuon-train fit wrote"):
+        FittedGenerator.load(path)
+    assert capsys.readouterr().out == ""
+
+
+def test_a_generator_of_a_later_version_is_refused(tmp_path):
+    torch.save({"format": "deepmuon-generator", "format_version": 2}, tmp_path / "generator.pt")
+    with pytest.raises(RefusedError, match="has format version 2, and this release reads version 1"):
+        FittedGenerator.load(tmp_path / "generator.pt")
+
+
+def test_an_architecture_that_there_is_not_is_refused(few):
+    with pytest.raises(RefusedError, match="there is no architecture diffusion, only quantile and transformer"):
+        fit_generator(few, "diffusion", seed=1)
+
+
+def spoiled(muons, **values):
+    columns = {name: getattr(muons, name).copy() for name in values}
+    for name, value in values.items():
+        columns[name][7] = value
+    return replace(muons, **columns)
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        (lambda m: m[:2999], "2999 muons are too few to learn from"),
+        (lambda m: spoiled(m, kinetic_energy=1.1e5), "muon number 7 has a kinetic energy outside 0.001 to 100000 GeV"),
+        (lambda m: spoiled(m, kinetic_energy=np.nan), "muon number 7 has a kinetic energy outside"),
+        (lambda m: spoiled(m, u=0, v=0, w=1), "muon number 7 does not go down"),
+        (lambda m: spoiled(m, u=0, v=0, w=-0.9), "muon number 7 has a direction whose length is not 1"),
+    ],
+)
+def test_a_sample_that_cant_be_learned_is_refused_in_one_line(few, architecture, change, complaint):
+    with pytest.raises(RefusedError, match=complaint) as error:
+        fit_generator(replace(few, muons=change(few.muons)), architecture, seed=1)
+    assert "\n" not in str(error.value)
+
+
+def test_the_smallest_sample_can_be_learned(sample, architecture, tmp_path):
+    smallest = replace(sample, muons=sample.muons[:3000])
+    generator = fit_generator(smallest, architecture, seed=1, settings=TINY[architecture], progress=False)
+    export_fitted(generator, tmp_path / "model.onnx")
+
+
+def turned(muons, strength):
+    """Turn muons so that their azimuth phi has the density 1 + strength cos(phi), about."""
+    azimuth = np.arctan2(muons.v, muons.u).astype(float)
+    azimuth -= strength * np.sin(azimuth)
+    sine = np.hypot(muons.u, muons.v)
+    return replace(muons, u=(sine * np.cos(azimuth)).astype(np.float32), v=(sine * np.sin(azimuth)).astype(np.float32))
+
+
+def test_an_azimuth_that_is_not_uniform_is_refused(sample):
+    modulated = replace(sample, muons=turned(sample.muons, 0.1))
+    with pytest.raises(RefusedError, match=r"the azimuth is not uniform.*--azimuth learned"):
+        fit_generator(modulated, "quantile", seed=1)
+
+
+@pytest.mark.parametrize("d", [-8, 0, 7, 100])
+def test_a_width_that_is_no_multiple_of_eight_is_refused(d):
+    with pytest.raises(RefusedError, match=f"d is {d}, and should be a multiple of 8"):
+        TransformerSettings(d=d)
+
+
+def test_a_batch_smaller_than_one_draw_is_refused():
+    with pytest.raises(RefusedError, match="a batch of 512 muons is less than one draw of 1024"):
+        TransformerSettings(d=1024, batch=512)

@@ -1,0 +1,107 @@
+"""Numbers that another program wrote as muons, refused where they can't be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
+from deepmuon_runtime.physical import describe
+
+__all__ = ["CHARGE_UNKNOWN", "Place", "foreign_muons", "numbered", "pdg_id_of", "refuse_unphysical"]
+
+CHARGE_UNKNOWN = 0
+"""In place of a muon's pdg_id, until its charge is stated (`deepmuon_training.data.conversion.draw_charges`)."""
+
+FEW_DIGITS = 0.01
+"""How far the length of a direction of three digits may be from 1."""
+
+Place = Callable[[int], str]
+"""Says which muon is meant, given its position in some arrays: "shower.out, line 7: the muon"."""
+
+
+def numbered(path: str | Path, kind: str, first: int) -> Place:
+    """Return the place of muons of which each is a line or row of a file, the first of them being number `first`."""
+    return lambda index: f"{path}, {kind} {first + index}: the muon"
+
+
+def foreign_muons(kinetic_energy: ArrayLike, direction: ArrayLike, pdg_id: ArrayLike, place: Place) -> Muons:
+    """Make muons of another program's numbers, with directions of length 1.
+
+    Parameters
+    ----------
+    kinetic_energy : array_like [n]
+        Kinetic energy in GeV.
+    direction : array_like [n, 3]
+        Direction of motion, z up; its length may be wrong by 1 %, as three digits make it.
+    pdg_id : array_like [n], or one for all
+        13, -13, or 0 where the charge is unknown.
+    place
+        Which muon it is, for an error.
+
+    Raises
+    ------
+    RefusedError
+        As `refuse_unphysical`.
+    """
+    u, v, w = vectors = np.asarray(direction, dtype=np.float64).T
+    pdg_ids = np.broadcast_to(pdg_id, len(w))
+    with np.errstate(over="ignore"):  # beyond float32: infinite, which is refused
+        refuse_unphysical(Muons.of(kinetic_energy, u, v, w, pdg_ids), place, tolerance=FEW_DIGITS)
+    u, v, w = vectors / np.linalg.norm(vectors, axis=0)
+    return Muons.of(kinetic_energy, u, v, w, pdg_ids)
+
+
+def refuse_unphysical(muons: Muons, place: Place, *, tolerance: float) -> None:
+    """Raise an error that names the first muon that can't be.
+
+    Parameters
+    ----------
+    muons, place
+        As for `foreign_muons`.
+    tolerance
+        How far the length of a direction may be from 1.
+
+    Raises
+    ------
+    RefusedError
+        If a kinetic energy is negative or not finite, or a direction has not length 1 or does not go down.
+    """
+    energy = muons.kinetic_energy
+    with np.errstate(all="ignore"):
+        length = np.sqrt(muons.u**2 + muons.v**2 + muons.w**2)
+    faults = {
+        "has a kinetic energy that is negative or not finite": ~((energy >= 0) & (energy < np.inf)),
+        "has a direction whose length is not 1": ~(np.abs(length - 1) <= tolerance),
+        "does not go down": ~(muons.w < 0),
+    }
+    found = [(int(np.argmax(bad)), fault) for fault, bad in faults.items() if bad.any()]
+    if found:
+        index, fault = min(found, key=lambda first: first[0])
+        raise RefusedError(f"{place(index)} {fault} ({describe(muons, index)})")
+
+
+def pdg_id_of(charge: NDArray[np.generic], place: Place) -> NDArray[np.int8]:
+    """Return the muon's particle number for each charge.
+
+    Parameters
+    ----------
+    charge : array [n]
+        Charge in e.
+    place
+        As for `foreign_muons`.
+
+    Raises
+    ------
+    RefusedError
+        If one is neither -1 nor +1.
+    """
+    bad = ~np.isin(charge, (-1, 1))
+    if bad.any():
+        index = int(np.argmax(bad))
+        raise RefusedError(f"{place(index)} has the charge {charge[index]}, which is neither -1 nor +1")
+    return np.where(charge == 1, MU_PLUS, MU_MINUS).astype(np.int8)

@@ -1,0 +1,180 @@
+"""The training loop that all networks share."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import torch
+from torch import nn
+from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
+from tqdm import tqdm
+
+from deepmuon_runtime.errors import FailedError
+from deepmuon_training.learning.checkpoint import Checkpoint
+
+__all__ = ["Schedule", "fit"]
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """How long and how fast to train.
+
+    Parameters
+    ----------
+    steps
+        Steps at most; the learning rate falls along a half cosine over this many.
+    learning_rate
+        Of AdamW, at its highest, after a linear rise over the first hundredth of the steps.
+    weight_decay
+        Of AdamW; 0 is Adam.
+    averaging
+        Decay of the exponential moving average of the weights; the averaged weights are the result.
+    validate_every
+        Steps between two looks at the validation distance.
+    patience
+        Stop after so many looks without a better one.
+    """
+
+    steps: int
+    learning_rate: float
+    weight_decay: float = 0.0
+    averaging: float = 0.999
+    validate_every: int = 500
+    patience: int = 20
+
+    def rate_at(self, step: int) -> float:
+        """Learning rate at a step, relative to the highest."""
+        rise = min(1.0, (step + 1) / max(1, self.steps // 100))
+        return rise * 0.5 * (1 + float(torch.cos(torch.tensor(torch.pi * step / self.steps))))
+
+
+def fit(
+    network: nn.Module,
+    loss: Callable[[nn.Module, torch.Generator], torch.Tensor],
+    distance: Callable[[nn.Module], float],
+    schedule: Schedule,
+    *,
+    seed: int,
+    name: str,
+    data: str = "",
+    checkpoint: Path | None = None,
+    progress: bool = True,
+) -> float:
+    """Train a network in place and leave in it the averaged weights with the smallest validation distance.
+
+    Parameters
+    ----------
+    network
+        Trained where it lies, on the CPU or a GPU.
+    loss
+        Draws a batch with the generator (always on the CPU) and returns the loss to make small.
+    distance
+        The validation distance of a network: of data that the loss never draws from.
+    schedule
+        Steps, rates, averaging and stopping.
+    seed
+        Seeds the generator of the batches. The initial weights are the caller's.
+    name
+        Shown by the progress bar.
+    data
+        Fingerprint of what the loss and the distance are made of, by which a checkpoint knows its own.
+    checkpoint
+        File that holds the whole state at each look at the distance, and every half minute; where it exists, the fit
+        goes on from it and ends with the same weights as an undisturbed one on the same machine.
+    progress
+        Whether to show steps, loss, distance and the time left on stderr.
+
+    Returns
+    -------
+    float
+        The smallest distance.
+
+    Raises
+    ------
+    RefusedError
+        If the checkpoint is of other data, schedule, seed, network or number of threads.
+    FailedError
+        If the loss or the distance is no finite number.
+    """
+    state = _State(network, schedule, seed)
+    weights = sum(parameter.numel() for parameter in network.parameters())
+    kept = Checkpoint(checkpoint, data=data, seed=seed, schedule=asdict(schedule), **{"number of weights": weights})
+    state.load(kept)
+    bar = tqdm(total=schedule.steps, initial=state.step, desc=name, disable=not progress, unit="step", mininterval=1)
+    with bar:
+        while state.step < schedule.steps and state.misses < schedule.patience:
+            value = state.advance(loss)
+            bar.update()
+            if state.step % schedule.validate_every == 0 or state.step == schedule.steps:
+                state.look(distance)
+                bar.set_postfix(loss=f"{value:.4g}", distance=f"{state.last:.4g}", best=f"{state.best:.4g}")
+                state.save(kept)
+            elif kept.is_due:
+                state.save(kept)
+    network.load_state_dict(state.best_weights)
+    return state.best
+
+
+class _State:
+    """Everything that a resumed fit must know."""
+
+    def __init__(self, network: nn.Module, schedule: Schedule, seed: int) -> None:
+        self.network, self.schedule = network, schedule
+        self.average = AveragedModel(network, multi_avg_fn=get_ema_multi_avg_fn(schedule.averaging))  # type: ignore[no-untyped-call]
+        self.optimizer = torch.optim.AdamW(
+            network.parameters(), lr=schedule.learning_rate, weight_decay=schedule.weight_decay
+        )
+        self.random = torch.Generator().manual_seed(seed)
+        self.step, self.misses, self.best, self.last = 0, 0, float("inf"), float("inf")
+        self.best_weights = copy.deepcopy(network.state_dict())
+
+    def advance(self, loss: Callable[[nn.Module, torch.Generator], torch.Tensor]) -> float:
+        for group in self.optimizer.param_groups:
+            group["lr"] = self.schedule.learning_rate * self.schedule.rate_at(self.step)
+        self.optimizer.zero_grad(set_to_none=True)
+        value = loss(self.network, self.random)
+        number = float(value.detach())
+        self._check("loss", number)
+        value.backward()  # type: ignore[no-untyped-call]
+        self.optimizer.step()
+        self.average.update_parameters(self.network)
+        self.step += 1
+        return number
+
+    def look(self, distance: Callable[[nn.Module], float]) -> None:
+        with torch.no_grad():
+            self.last = distance(self.average.module)
+        self._check("validation distance", self.last)
+        self.misses += 1
+        if self.last < self.best:
+            self.best, self.misses = self.last, 0
+            self.best_weights = copy.deepcopy(self.average.module.state_dict())
+
+    def _check(self, name: str, value: float) -> None:
+        if not math.isfinite(value):
+            raise FailedError(f"the {name} is {value} after {self.step} steps: training diverged, try a lower rate")
+
+    def save(self, kept: Checkpoint) -> None:
+        kept.save(
+            network=self.network.state_dict(),
+            average=self.average.state_dict(),
+            optimizer=self.optimizer.state_dict(),
+            random=self.random.get_state(),
+            best_weights=self.best_weights,
+            numbers=(self.step, self.misses, self.best, self.last),
+        )
+
+    def load(self, kept: Checkpoint) -> None:
+        parts = kept.load()
+        if parts is None:
+            return
+        self.network.load_state_dict(parts["network"])
+        self.random.set_state(parts["random"])
+        self.average.load_state_dict(parts["average"])
+        self.optimizer.load_state_dict(parts["optimizer"])
+        self.best_weights = parts["best_weights"]
+        self.step, self.misses, self.best, self.last = parts["numbers"]

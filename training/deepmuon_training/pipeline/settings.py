@@ -1,0 +1,96 @@
+"""What a pipeline is told: all settings of a run, in one small TOML file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.latents.philox import LARGEST_SEED
+from deepmuon_training.generators.fit import ARCHITECTURES, FEWEST_MUONS, Azimuth, Settings
+from deepmuon_training.generators.quantile.fit import QuantileSchedules
+from deepmuon_training.generators.transformer.fit import TransformerSettings
+from deepmuon_training.pipeline.settings_file import read_table, settings_from
+from deepmuon_training.scores import evaluate
+
+__all__ = ["PipelineSettings", "read_pipeline_settings"]
+
+_LEAST = {"layers": 0, "muons": FEWEST_MUONS, "muons_per_part": 1, "scored_muons": evaluate.FEWEST_MUONS, "seed": 0}
+
+
+@dataclass(frozen=True)
+class PipelineSettings:
+    """The settings of a pipeline, by the names that they have in its file; each may be left out.
+
+    Parameters
+    ----------
+    architecture
+        "quantile" or "transformer".
+    azimuth
+        Of a `quantile` generator, "uniform" or "learned"; see `deepmuon_training.generators.fit.fit_generator`.
+    layers
+        Slabs below the sample's depth; 0 fits the sample and no more.
+    layer_m
+        Thickness of each slab in m.
+    material, density
+        What they are made of, Geant4's (NIST) name or standard_rock, and its density in g/cm3 if not its own.
+    muons
+        Drawn from each generator to be carried through the slab below it; without effect where `direct`.
+    muons_per_part
+        Muons that are carried between two savings.
+    scored_muons
+        Drawn from a generator to compare it with held-out muons.
+    direct
+        Carry the muons that came through the slab above, instead of those that its generator draws.
+    seed
+        From which all seeds are derived, by `deepmuon_training.pipeline.seeds.step_seed`.
+    quantile, transformer
+        How generators of this architecture are fitted.
+
+    Raises
+    ------
+    RefusedError
+        If a value can't be.
+    """
+
+    architecture: str = "quantile"
+    azimuth: Azimuth = "uniform"
+    layers: int = 5
+    layer_m: float = 10.0
+    material: str = "G4_WATER"
+    density: float | None = None
+    muons: int = 4_000_000
+    muons_per_part: int = 500_000
+    scored_muons: int = 20_000_000
+    direct: bool = False
+    seed: int = 1
+    quantile: QuantileSchedules = field(default_factory=QuantileSchedules)
+    transformer: TransformerSettings = field(default_factory=TransformerSettings)
+
+    def __post_init__(self) -> None:
+        """Refuse what can't be."""
+        if self.architecture not in ARCHITECTURES:
+            raise RefusedError(f"architecture is {self.architecture!r}, and should be {' or '.join(ARCHITECTURES)}")
+        for key, least in _LEAST.items():
+            if getattr(self, key) < least:
+                raise RefusedError(f"{key} is {getattr(self, key)}, and should be at least {least}")
+        if self.seed > LARGEST_SEED:
+            raise RefusedError(f"seed is {self.seed}, and should be at most 2^64 - 1")
+        if self.layer_m <= 0:
+            raise RefusedError(f"layer_m is {self.layer_m:g}, and should be above 0")
+
+    @property
+    def fit(self) -> Settings:
+        """How the generators of this pipeline are fitted."""
+        return self.quantile if self.architecture == "quantile" else self.transformer
+
+
+def read_pipeline_settings(path: Path) -> PipelineSettings:
+    """Read the settings of a pipeline.
+
+    Raises
+    ------
+    RefusedError
+        If the file is no TOML, or a key or value is none of these settings.
+    """
+    return settings_from(PipelineSettings(), read_table(path), str(path))
