@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from deepmuon_runtime import Generator, read_muons
 from deepmuon_runtime.latents.philox import fill_latents
-from deepmuon_runtime.muon_file.file import COLUMNS
+from deepmuon_runtime.muon_file.format import COLUMNS
 from deepmuon_runtime.ordered_map import ordered_map
 
 __all__ = ["JOBS"]

@@ -63,8 +63,7 @@ def main() -> NoReturn:
 
 def _print(pieces: Iterator[bytes]) -> None:
     """Write to stdout, unbuffered: nothing is left to be written when its reader has gone."""
-    from deepmuon_runtime.errors import FailedError
-    from deepmuon_runtime.muon_file.damage import reason
+    from deepmuon_runtime.errors import FailedError, reason
 
     try:
         with open(sys.stdout.fileno(), "wb", buffering=0, closefd=False) as stdout:

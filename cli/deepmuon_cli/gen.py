@@ -127,8 +127,8 @@ def gen(
         raise click.UsageError("where to? Give the name of a file: -o muons.h5")
 
     from deepmuon_runtime import Generator, new_seed
+    from deepmuon_runtime.files.output import check_output
     from deepmuon_runtime.latents.shard import WHOLE_RUN
-    from deepmuon_runtime.muon_file.file import check_output
 
     check_output(output, overwrite)
     generator = Generator.open(depth, architecture, file=model, device=device, threads=threads)

@@ -34,8 +34,8 @@ def plot(files: tuple[Path, ...], output: Path, overwrite: bool) -> None:
     shares of their muons. Needs matplotlib, which `pip install 'deepmuon-runtime[plot]'` brings.
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime.errors import RefusedError
+    from deepmuon_runtime.files.output import check_output
     from deepmuon_runtime.files.whole import whole_file
-    from deepmuon_runtime.muon_file.file import check_output
     from deepmuon_runtime.views.spectra import count_spectra
 
     check_output(output, overwrite)

@@ -9,8 +9,9 @@ from deepmuon_runtime.latents.shard import Shard
 from deepmuon_runtime.model.metadata import Model
 from deepmuon_runtime.model.released import list_models
 from deepmuon_runtime.muon_file.check import Report, check_file
-from deepmuon_runtime.muon_file.file import MuonWriter, read_attributes, read_muons, write_muons
 from deepmuon_runtime.muon_file.merge import merge_shards
+from deepmuon_runtime.muon_file.reader import read_attributes, read_muons
+from deepmuon_runtime.muon_file.writer import MuonWriter, write_muons
 from deepmuon_runtime.muons import Muons
 
 __all__ = [

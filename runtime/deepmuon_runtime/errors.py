@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-__all__ = ["DeepMuonError", "FailedError", "RefusedError", "first_line"]
+import os
+
+__all__ = ["DeepMuonError", "FailedError", "RefusedError", "first_line", "reason"]
 
 
 class DeepMuonError(Exception):
@@ -21,3 +23,10 @@ def first_line(error: Exception) -> str:
     """Return the first line of another library's error, or what sort of error it is where that has no text."""
     lines = str(error).strip().splitlines()
     return lines[0] if lines else type(error).__name__
+
+
+def reason(error: BaseException) -> str:
+    """Return the cause of an error in one line."""
+    if isinstance(error, OSError) and error.errno:
+        return os.strerror(error.errno)
+    return " ".join(str(error).split()) or type(error).__name__

@@ -19,12 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import FailedError, RefusedError, first_line
+from deepmuon_runtime.files.output import check_output
 from deepmuon_runtime.latents.philox import checked_seed, fill_latents, new_seed
 from deepmuon_runtime.latents.poisson import poisson
 from deepmuon_runtime.latents.shard import WHOLE_RUN, Shard
 from deepmuon_runtime.model.metadata import LATENTS_PER_MUON, Model
 from deepmuon_runtime.model.released import read_released, released_model
-from deepmuon_runtime.muon_file.file import BYTES_PER_MUON, MuonWriter, check_output
+from deepmuon_runtime.muon_file.format import BYTES_PER_MUON
+from deepmuon_runtime.muon_file.writer import MuonWriter
 from deepmuon_runtime.muons import MU_PLUS, Muons
 from deepmuon_runtime.ordered_map import ordered_map
 from deepmuon_runtime.physical import check_physical

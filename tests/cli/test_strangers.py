@@ -17,8 +17,8 @@ from support.thorough import TIMES
 from support.tiny_models import tiny_model
 
 from deepmuon_runtime import Generator, Shard, check_file, list_models
+from deepmuon_runtime.files.partial import PARTIAL_SUFFIX
 from deepmuon_runtime.model.released import read_released
-from deepmuon_runtime.muon_file.file import PARTIAL_SUFFIX
 
 RUN_MANY = Path(__file__).parents[1] / "support" / "run_many.py"
 SEED = 4

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.muon_file.file import read_attributes
+from deepmuon_runtime.muon_file.reader import read_attributes
 from deepmuon_runtime.muons import Muons
 from deepmuon_training.data.cry import CRY_SHOWER_VARIANCE, HELD_OUT_CRY_MUONS, read_cry
 from deepmuon_training.sample import Sample, read_sample, write_sample

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime.muons import Muons
-from deepmuon_training.sample import MINIMUM_ENERGY
+from deepmuon_runtime.physical import LOWEST_ENERGY
 
 __all__ = ["behind_mountain", "rock", "skyline"]
 
@@ -46,4 +46,4 @@ def behind_mountain(muons: Muons) -> Muons:
     ratio = IONISATION / RADIATION
     energy = (muons.kinetic_energy + ratio) * np.exp(-RADIATION * thickness) - ratio
     left = replace(muons, kinetic_energy=energy.astype(np.float32))
-    return left[energy >= MINIMUM_ENERGY]
+    return left[energy >= LOWEST_ENERGY]

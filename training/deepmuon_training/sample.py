@@ -6,18 +6,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from deepmuon_runtime.muon_file.file import read_attributes, read_muons, write_muons
+from deepmuon_runtime.muon_file.reader import read_attributes, read_muons
+from deepmuon_runtime.muon_file.writer import write_muons
 from deepmuon_runtime.muons import Muons
 
 __all__ = [
-    "MINIMUM_ENERGY",
     "Sample",
     "read_sample",
     "write_sample",
 ]
-
-MINIMUM_ENERGY = 1e-3
-"""Muons below this kinetic energy [GeV] are not part of any sample."""
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,6 @@ class _Watched:
         try:
             yield
         except OSError as error:
-            from deepmuon_runtime.errors import FailedError
-            from deepmuon_runtime.muon_file.damage import reason
+            from deepmuon_runtime.errors import FailedError, reason
 
             raise FailedError(f"stdout was not written to its end: {reason(error)}") from error

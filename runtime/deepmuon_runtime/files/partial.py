@@ -1,6 +1,8 @@
-"""Files that are not complete yet: how they are called, and whose writer is dead.
+"""Files that are not complete yet: how they are called, how they get their name, and whose writer is dead.
 
-A writer locks its file (flock) for as long as it lives. The lock goes with the process, however that ends.
+A file is written under a temporary name in its own folder (`NAME.<8 hex digits>.deepmuon-partial`), flushed to disk by
+its writer, and only then linked to its name: under that name there is a complete file or none. A writer locks its file
+(flock) for as long as it lives. The lock goes with the process, however that ends.
 """
 
 from __future__ import annotations
@@ -10,27 +12,85 @@ import os
 import re
 import secrets
 import warnings
-from contextlib import suppress
+import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-__all__ = ["PARTIAL_SUFFIX", "hold", "new_partial", "warn_of_leftovers"]
+from deepmuon_runtime.errors import FailedError, reason
+from deepmuon_runtime.files.output import check_output
+from deepmuon_runtime.files.publish import publish
+
+__all__ = ["PARTIAL_SUFFIX", "PartialFile"]
 
 PARTIAL_SUFFIX = ".deepmuon-partial"
 """Ends the name of a file that is still being written, or that a killed process left behind."""
 
 
-def new_partial(target: Path) -> Path:
-    """Return a temporary name, never the same, in the folder of the file that is to be."""
-    return target.with_name(f"{target.name}.{secrets.token_hex(4)}{PARTIAL_SUFFIX}")
+class PartialFile:
+    """A file until it is complete: its temporary name, and the name that it gets.
+
+    Parameters
+    ----------
+    path
+        The wanted file; a symbolic link is followed.
+    overwrite
+        Whether an existing file is replaced, at the moment when the new one is complete.
+
+    Attributes
+    ----------
+    target : Path
+        The absolute path of the wanted file, links followed.
+    path : Path
+        The temporary one, never the same, in its folder.
+
+    Raises
+    ------
+    RefusedError
+        As `deepmuon_runtime.files.output.check_output`.
+    """
+
+    def __init__(self, path: str | Path, overwrite: bool = False) -> None:
+        self.target = check_output(path, overwrite)
+        self.path = self.target.with_name(f"{self.target.name}.{secrets.token_hex(4)}{PARTIAL_SUFFIX}")
+        self._overwrite = overwrite
+
+    def begin(self) -> None:
+        """Warn of what dead writers left, and see to it that this one leaves nothing: before the first byte."""
+        _warn_of_leftovers(self.target)
+        self._remove = weakref.finalize(self, _remove, self.path)  # at the latest when the process ends
+
+    def hold(self, descriptor: int) -> None:
+        """Mark the temporary file, which is open, as one whose writer is alive."""
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+
+    def publish(self) -> None:
+        """Give the file, which is complete and on disk, its name; errors are those of `publish.publish`."""
+        publish(self.path, self.target, self._overwrite)
+
+    def remove(self) -> None:
+        """Take the temporary name away, where it is still there."""
+        self._remove()
+
+    @contextmanager
+    def failures(self) -> Iterator[None]:
+        """Turn what a file system says of the body of a `with` statement into one line.
+
+        Raises
+        ------
+        FailedError
+            If the file can't be written, or another process has written it meanwhile.
+        """
+        try:
+            yield
+        except FileExistsError as error:
+            raise FailedError(f"{self.target} was written by another process meanwhile: kept as it is") from error
+        except OSError as error:
+            raise FailedError(f"{self.target} was not written: {reason(error)}") from error
 
 
-def hold(descriptor: int) -> None:
-    """Mark an open file as one whose writer is alive."""
-    with suppress(OSError):  # a file system without locks
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
-
-
-def warn_of_leftovers(target: Path) -> None:
+def _warn_of_leftovers(target: Path) -> None:
     """Warn of what killed writers of a file have left in its folder; those that are alive are passed over."""
     pattern = re.compile(re.escape(target.name) + r"\.[0-9a-f]{8}" + re.escape(PARTIAL_SUFFIX))
     names: list[str] = []
@@ -56,3 +116,8 @@ def _is_abandoned(path: str) -> bool:
     finally:
         os.close(descriptor)
     return True
+
+
+def _remove(path: Path) -> None:
+    with suppress(OSError):  # never made, already in its place, or its folder is gone
+        path.unlink()

@@ -7,7 +7,7 @@ import os
 import warnings
 from pathlib import Path
 
-from deepmuon_runtime.muon_file.damage import reason
+from deepmuon_runtime.errors import reason
 
 __all__ = ["publish"]
 

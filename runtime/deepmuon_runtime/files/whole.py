@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from deepmuon_runtime.errors import FailedError
-from deepmuon_runtime.files.partial import hold, new_partial, warn_of_leftovers
-from deepmuon_runtime.files.publish import publish
-from deepmuon_runtime.muon_file.damage import reason
-from deepmuon_runtime.muon_file.file import check_output
+from deepmuon_runtime.files.partial import PartialFile
 
-__all__ = ["whole_file"]
+__all__ = ["whole_file", "write_whole"]
 
 
 @contextmanager
@@ -35,20 +31,34 @@ def whole_file(path: str | Path, *, overwrite: bool = False) -> Iterator[BinaryI
     FailedError
         If it can't be written all the same, or another process has written it meanwhile.
     """
-    target = check_output(path, overwrite)
-    warn_of_leftovers(target)
-    partial = new_partial(target)
+    partial = PartialFile(path, overwrite)
+    partial.begin()
     try:
-        with partial.open("xb") as file:
-            hold(file.fileno())
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        publish(partial, target, overwrite)
-    except FileExistsError as error:
-        raise FailedError(f"{target} was written by another process meanwhile: kept as it is") from error
-    except OSError as error:
-        raise FailedError(f"{target} was not written: {reason(error)}") from error
+        with partial.failures():
+            with partial.path.open("xb") as file:
+                partial.hold(file.fileno())
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
+            partial.publish()
     finally:
-        with suppress(OSError):  # never made, or already in its place
-            partial.unlink()
+        partial.remove()
+
+
+def write_whole(path: str | Path, contents: bytes, *, overwrite: bool = False) -> None:
+    """Write a file that is complete under its name, or not there; arguments and errors are those of `whole_file`.
+
+    Parameters
+    ----------
+    path, overwrite
+        As for `whole_file`.
+    contents
+        All of the file.
+
+    Raises
+    ------
+    RefusedError, FailedError
+        As `whole_file` raises them.
+    """
+    with whole_file(path, overwrite=overwrite) as file:
+        file.write(contents)

@@ -11,16 +11,16 @@ from zlib import crc32
 import h5py
 import numpy as np
 
-from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.errors import RefusedError, reason
 from deepmuon_runtime.model.metadata import Model
 from deepmuon_runtime.model.released import list_models
 from deepmuon_runtime.muon_file.attributes import attribute_defects, is_generated, sound_attributes
 from deepmuon_runtime.muon_file.checksum import unlike
-from deepmuon_runtime.muon_file.damage import READ_ERRORS, member, reason
-from deepmuon_runtime.muon_file.file import CHECKSUM, COLUMNS, check_format, python_value
+from deepmuon_runtime.muon_file.damage import READ_ERRORS, member
+from deepmuon_runtime.muon_file.format import CHECKSUM, COLUMNS, check_format, python_value
 from deepmuon_runtime.muon_file.virtual import VirtualColumn, opened_source
 from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
-from deepmuon_runtime.physical import POSITIVE_ENERGIES, describe, find_unphysical
+from deepmuon_runtime.physical import POSITIVE_ENERGIES, Fault, describe, explain, find_unphysical
 
 __all__ = ["Report", "check_file"]
 
@@ -215,7 +215,7 @@ def _examine_muons(columns: dict[str, _Column], report: Report, progress: Callab
     """Read all muons and note, for each fault, the first that has it and how many have."""
     model = report.model
     energies = POSITIVE_ENERGIES if model is None else (model.energy_min_gev, model.energy_max_gev)
-    faults: dict[str, _Fault] = {}
+    faults: dict[Fault, _Faulty] = {}
     total = len(columns["pdg_id"])
     for first in range(0, total, PIECE):
         span = slice(first, min(first + PIECE, total))
@@ -227,12 +227,15 @@ def _examine_muons(columns: dict[str, _Column], report: Report, progress: Callab
         report.add(muons)
         for fault, bad in find_unphysical(muons, *energies).items():
             index = int(np.argmax(bad))
-            known = faults.setdefault(fault, _Fault(first + index, describe(muons, index)))
+            known = faults.setdefault(fault, _Faulty(first + index, describe(muons, index)))
             known.count += int(np.count_nonzero(bad))
         progress(len(muons))
     else:
         report.defects += _checksum_defects(columns)
-    report.defects += (f"muon {known.first} {fault} ({known.muon}){known.others}" for fault, known in faults.items())
+    report.defects += (
+        f"muon {known.first} {explain(fault, *energies)} ({known.muon}){known.others}"
+        for fault, known in faults.items()
+    )
 
 
 def _checksum_defects(columns: dict[str, _Column]) -> Iterator[str]:
@@ -244,7 +247,7 @@ def _checksum_defects(columns: dict[str, _Column]) -> Iterator[str]:
 
 
 @dataclass
-class _Fault:
+class _Faulty:
     """What is wrong with some muons."""
 
     first: int

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
-
 import h5py
 
-__all__ = ["READ_ERRORS", "member", "reason"]
+__all__ = ["READ_ERRORS", "member"]
 
 READ_ERRORS = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, MemoryError)
 """What h5py raises when a file is damaged."""
@@ -23,10 +21,3 @@ def member(group: h5py.Group, path: str) -> h5py.Group | h5py.Dataset | None:
     except READ_ERRORS:
         return None
     return found
-
-
-def reason(error: BaseException) -> str:
-    """Return the cause of an error in one line."""
-    if isinstance(error, OSError) and error.errno:
-        return os.strerror(error.errno)
-    return " ".join(str(error).split()) or type(error).__name__

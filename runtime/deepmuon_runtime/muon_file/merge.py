@@ -13,7 +13,9 @@ import numpy as np
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.latents.shard import WHOLE_RUN
 from deepmuon_runtime.muon_file.checksum import unlike
-from deepmuon_runtime.muon_file.file import COLUMNS, MuonWriter, read_attributes, read_checksums, read_pieces
+from deepmuon_runtime.muon_file.format import COLUMNS
+from deepmuon_runtime.muon_file.reader import read_attributes, read_checksums, read_pieces
+from deepmuon_runtime.muon_file.writer import MuonWriter
 
 __all__ = ["merge_shards"]
 

@@ -16,7 +16,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from deepmuon_runtime.muon_file.damage import READ_ERRORS, member, reason
+from deepmuon_runtime.errors import reason
+from deepmuon_runtime.muon_file.damage import READ_ERRORS, member
 
 __all__ = ["Source", "VirtualColumn", "create_virtual_column", "opened_source"]
 

@@ -15,7 +15,7 @@ from dask import delayed
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.generator import Generator, checked_numbers
 from deepmuon_runtime.latents.philox import checked_seed, new_seed
-from deepmuon_runtime.muon_file.file import COLUMNS
+from deepmuon_runtime.muon_file.format import COLUMNS
 from deepmuon_runtime.muons import Muons
 
 __all__ = ["CHUNK", "muon_arrays"]

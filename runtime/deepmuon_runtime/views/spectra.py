@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.muon_file.file import read_attributes, read_pieces
+from deepmuon_runtime.muon_file.reader import read_attributes, read_pieces
+from deepmuon_runtime.physical import HIGHEST_ENERGY, LOWEST_ENERGY
 
 __all__ = ["ENERGY_EDGES", "ZENITH_EDGES", "Spectra", "count_spectra"]
 
 PIECE = 1 << 17  # muons read at once
 
-ENERGY_EDGES = np.geomspace(1e-3, 1e5, 81)
+ENERGY_EDGES = np.geomspace(LOWEST_ENERGY, HIGHEST_ENERGY, 81)
 """Edges of the bins in kinetic energy [GeV], ten to a decade."""
 
 ZENITH_EDGES = np.linspace(0, 90, 46)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.muon_file.file import read_pieces
+from deepmuon_runtime.muon_file.reader import read_pieces
 from deepmuon_runtime.muons import Muons
 
 __all__ = ["UNITS", "csv_pieces"]

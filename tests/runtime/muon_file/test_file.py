@@ -26,8 +26,10 @@ from deepmuon_runtime import (
     read_muons,
     write_muons,
 )
+from deepmuon_runtime.files.output import check_output
+from deepmuon_runtime.files.partial import PARTIAL_SUFFIX
 from deepmuon_runtime.files.quiet import QuietFile
-from deepmuon_runtime.muon_file.file import PARTIAL_SUFFIX, check_output, read_checksums, read_pieces
+from deepmuon_runtime.muon_file.reader import read_checksums, read_pieces
 from deepmuon_runtime.muon_file.virtual import VirtualColumn
 
 PLANE = {"depth_m": 10.0, "medium": "G4_WATER"}

@@ -199,9 +199,9 @@ KILLS: dict[str, dict[str, tuple[str, str, int, str]]] = {
         "charge fit": ("torch.optim", "AdamW.step", 2, "unfinished-quantile-0m.pt/charge.pt"),
         "zenith fit": ("torch.optim", "LBFGS.step", 2, "*"),
         "export": ("deepmuon_training.export.onnx_export", "compare", 1, "quantile-0m.pt"),
-        "draw": ("deepmuon_runtime.muon_file.file", "MuonWriter.append", 1, "quantile-0m.onnx"),
+        "draw": ("deepmuon_runtime.muon_file.writer", "MuonWriter.append", 1, "quantile-0m.onnx"),
         "transport": ("time", "sleep", 2, "unfinished-muons-1m.h5/part-00000.h5"),
-        "survivors joined": ("deepmuon_runtime.muon_file.file", "MuonWriter.append", 3, "*/part-00001.h5"),
+        "survivors joined": ("deepmuon_runtime.muon_file.writer", "MuonWriter.append", 3, "*/part-00001.h5"),
     },
     "transformer": {
         "fit": ("torch.optim", "AdamW.step", 2, "unfinished-transformer-0m.pt/transformer.pt"),

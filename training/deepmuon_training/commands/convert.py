@@ -115,7 +115,7 @@ def command(input_file: Path, output: Path, form: str, overwrite: bool, quiet: b
     is asked for where the format is CRY's.
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime import new_seed
-    from deepmuon_runtime.muon_file.file import check_output
+    from deepmuon_runtime.files.output import check_output
     from deepmuon_training.data.conversion import draw_charges
     from deepmuon_training.sample import write_sample
 

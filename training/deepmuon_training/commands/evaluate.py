@@ -58,7 +58,7 @@ def command(
     which needs no network. Each score stands beside what two alike samples of these sizes show. 100,000 muons are
     the fewest, of either; only more of them show small errors.
     """  # noqa: D301 - click looks for the character \b
-    from deepmuon_runtime.muon_file.file import check_output
+    from deepmuon_runtime.files.output import check_output
 
     if output == json_output:
         raise click.UsageError("--json needs a file of its own, other than --output")
@@ -66,11 +66,11 @@ def command(
         check_output(path, overwrite)
 
     from deepmuon_runtime import Generator
+    from deepmuon_runtime.files.whole import write_whole
     from deepmuon_training.reports.report import html_report
     from deepmuon_training.sample import read_sample
     from deepmuon_training.scores.evaluate import FEWEST_MUONS, evaluate
     from deepmuon_training.scores.scorecard import markdown_scorecard
-    from deepmuon_training.whole_file import write_whole
 
     generator, truth = Generator.open(file=model, device="cpu"), read_sample(held_out)
     facts = generator.model

@@ -31,7 +31,7 @@ def command(generator: Path, output: Path, overwrite: bool, quiet: bool) -> None
     out, and what is known of the training as metadata. A rate that is unknown is left out. The muons of the file are
     compared with PyTorch's before it is written. The same generator gives the same bytes.
     """  # noqa: D301 - click looks for the character \b
-    from deepmuon_runtime.muon_file.file import check_output
+    from deepmuon_runtime.files.output import check_output
 
     check_output(output, overwrite)
 

@@ -81,7 +81,7 @@ def command(
         charge.steps = 3000               charge.steps = 3000
         azimuth.steps = 4000              calibration = 4e6
     """  # noqa: D301 - click looks for the character \b
-    from deepmuon_runtime.muon_file.file import check_output
+    from deepmuon_runtime.files.output import check_output
 
     check_output(output, overwrite)
     if width is not None and architecture != "transformer":
@@ -122,8 +122,7 @@ def command(
 
 
 def _made(folder: Path) -> Path:
-    from deepmuon_runtime.errors import RefusedError
-    from deepmuon_runtime.muon_file.file import reason
+    from deepmuon_runtime.errors import RefusedError, reason
 
     try:
         folder.mkdir(exist_ok=True)

@@ -67,10 +67,10 @@ def command(settings: Path, sample: Path, work: Path, held_out: tuple[Path, ...]
     checkpoint, a transport from its last part. It ends with the same muons and models as an undisturbed run. FOLDER
     holds every file on the way, the settings, and layers.csv, the table.
     """  # noqa: D301 - click looks for the character \b
+    from deepmuon_runtime.files.whole import write_whole
     from deepmuon_training.pipeline.loop import plan
     from deepmuon_training.pipeline.settings import read_pipeline_settings
     from deepmuon_training.pipeline.table import as_csv, as_text, rows
-    from deepmuon_training.whole_file import write_whole
 
     chosen = read_pipeline_settings(settings)
     pipeline = plan(replace(chosen, direct=chosen.direct or direct), sample, work, held_out)

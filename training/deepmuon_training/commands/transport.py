@@ -73,7 +73,7 @@ def command(
     same survivors for any --processes. Muons that have a depth already can go on only in the material above them.
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime import new_seed
-    from deepmuon_runtime.muon_file.file import check_output
+    from deepmuon_runtime.files.output import check_output
     from deepmuon_training.sample import read_sample, write_sample
     from deepmuon_training.transport.slab import transport
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
-from deepmuon_training.sample import MINIMUM_ENERGY, Sample
+from deepmuon_runtime.physical import LOWEST_ENERGY
+from deepmuon_training.sample import Sample
 
 __all__ = ["draw_charges", "sample_of", "state_rate", "take_rate"]
 
@@ -31,7 +32,7 @@ def sample_of(muons: Muons, what: str, *, source: str, depth_m: float = 0.0, med
     RefusedError
         If none is left.
     """
-    kept = muons.kinetic_energy >= MINIMUM_ENERGY
+    kept = muons.kinetic_energy >= LOWEST_ENERGY
     if not kept.any():
         raise RefusedError(f"{what}: there is no muon of at least 1 MeV among {len(muons):,}")
     dropped = f"{what}: {len(muons)} muons, {np.sum(~kept)} below 1 MeV dropped"

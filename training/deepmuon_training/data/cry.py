@@ -7,11 +7,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.muon_file.file import READ_ERRORS, reason
+from deepmuon_runtime.errors import RefusedError, reason
+from deepmuon_runtime.muon_file.damage import READ_ERRORS
 from deepmuon_runtime.muons import Muons
+from deepmuon_runtime.physical import LOWEST_ENERGY
 from deepmuon_training.data.foreign_muons import numbered, pdg_id_of, refuse_unphysical
-from deepmuon_training.sample import MINIMUM_ENERGY, Sample
+from deepmuon_training.sample import Sample
 
 __all__ = ["CRY_SHOWER_VARIANCE", "HELD_OUT_CRY_MUONS", "read_cry"]
 
@@ -71,7 +72,7 @@ def read_cry(path: str | Path, part: slice = slice(None)) -> Sample:
             f"{path} is no CRY sample (HDF5, /muons with energy, direction and charge): {reason(error)}"
         ) from error
     refuse_unphysical(muons, place, tolerance=2e-6)  # as they are: released models learned from these very numbers
-    kept = muons.kinetic_energy >= MINIMUM_ENERGY
+    kept = muons.kinetic_energy >= LOWEST_ENERGY
     if not kept.any():
         raise RefusedError(f"{path} has no muon of at least 1 MeV in its rows {rows.start} to {rows.stop}")
     return Sample(

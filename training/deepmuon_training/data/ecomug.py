@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from deepmuon_runtime.muon_file.file import MuonWriter
+from deepmuon_runtime.muon_file.writer import MuonWriter
 from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
+from deepmuon_runtime.physical import HIGHEST_ENERGY, LOWEST_ENERGY
 from deepmuon_training.sample import Sample
 
 __all__ = [
@@ -72,7 +73,7 @@ def _cumulative_rate(minimum: float, maximum: float) -> tuple[NDArray[np.float64
     return log_energy, np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def plane_rate(minimum: float = 1e-3, maximum: float = 1e5) -> float:
+def plane_rate(minimum: float = LOWEST_ENERGY, maximum: float = HIGHEST_ENERGY) -> float:
     """Rate through a horizontal plane [Hz/m2] between two kinetic energies [GeV]."""
     return float(_cumulative_rate(minimum, maximum)[1][-1])
 
@@ -82,8 +83,8 @@ def sea_level_muons(
     *,
     seed: int | Sequence[int],
     charge_ratio: float = CHARGE_RATIO,
-    minimum: float = 1e-3,
-    maximum: float = 1e5,
+    minimum: float = LOWEST_ENERGY,
+    maximum: float = HIGHEST_ENERGY,
 ) -> Muons:
     """Draw n independent muons crossing a horizontal plane at sea level.
 

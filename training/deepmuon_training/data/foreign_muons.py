@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
-from deepmuon_runtime.physical import describe
+from deepmuon_runtime.physical import NOT_NEGATIVE_ENERGIES, first_unphysical
 
 __all__ = ["CHARGE_UNKNOWN", "Place", "foreign_muons", "numbered", "pdg_id_of", "refuse_unphysical"]
 
@@ -71,18 +71,9 @@ def refuse_unphysical(muons: Muons, place: Place, *, tolerance: float) -> None:
     RefusedError
         If a kinetic energy is negative or not finite, or a direction has not length 1 or does not go down.
     """
-    energy = muons.kinetic_energy
-    with np.errstate(all="ignore"):
-        length = np.sqrt(muons.u**2 + muons.v**2 + muons.w**2)
-    faults = {
-        "has a kinetic energy that is negative or not finite": ~((energy >= 0) & (energy < np.inf)),
-        "has a direction whose length is not 1": ~(np.abs(length - 1) <= tolerance),
-        "does not go down": ~(muons.w < 0),
-    }
-    found = [(int(np.argmax(bad)), fault) for fault, bad in faults.items() if bad.any()]
-    if found:
-        index, fault = min(found, key=lambda first: first[0])
-        raise RefusedError(f"{place(index)} {fault} ({describe(muons, index)})")
+    bad = first_unphysical(muons, *NOT_NEGATIVE_ENERGIES, length_tolerance=tolerance, charge_known=False)
+    if bad is not None:
+        raise RefusedError(f"{place(bad[0])} {bad[1]}")
 
 
 def pdg_id_of(charge: NDArray[np.generic], place: Place) -> NDArray[np.int8]:

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.muon_file.file import reason
+from deepmuon_runtime.errors import RefusedError, reason
 from deepmuon_runtime.muons import MU_MINUS, Muons
 from deepmuon_training.data.foreign_muons import CHARGE_UNKNOWN, Place, foreign_muons, numbered, pdg_id_of
 from deepmuon_training.data.number_lines import read_number_lines

@@ -11,8 +11,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.muon_file.file import reason
+from deepmuon_runtime.errors import RefusedError, reason
 
 __all__ = ["read_number_lines"]
 

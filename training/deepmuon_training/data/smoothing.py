@@ -21,8 +21,9 @@ from scipy.special import logit
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import Muons
+from deepmuon_runtime.physical import LOWEST_ENERGY
 from deepmuon_training.data.cry_cells import COS_ZENITH_EDGES, ENERGY_CELL
-from deepmuon_training.sample import MINIMUM_ENERGY, Sample
+from deepmuon_training.sample import Sample
 
 __all__ = ["StepSmoother", "smoothed"]
 
@@ -217,7 +218,7 @@ def smoothed(sample: Sample, smooth: StepSmoother) -> Sample:
         As `StepSmoother` when it is called.
     """
     muons = smooth(sample.muons)
-    kept = muons.kinetic_energy >= MINIMUM_ENERGY
+    kept = muons.kinetic_energy >= LOWEST_ENERGY
     return sample.then(
         f"steps of CRY's tables taken out, {np.sum(~kept)} muons moved below 1 MeV dropped",
         muons=muons[kept],

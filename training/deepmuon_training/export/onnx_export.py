@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from onnx import TensorProto
 
 from deepmuon_runtime.errors import FailedError
+from deepmuon_runtime.files.output import check_output
+from deepmuon_runtime.files.whole import write_whole
 from deepmuon_runtime.latents.philox import latents
 from deepmuon_runtime.model.metadata import CONTRACT_VERSION, METADATA_PREFIX
-from deepmuon_runtime.muon_file.file import check_output
 from deepmuon_training.energy_transform import LAMBDA
 from deepmuon_training.export.graph import Graph
 from deepmuon_training.sample import Sample
-from deepmuon_training.whole_file import write_whole
 
 __all__ = ["Exportable", "Mismatch", "Training", "compare", "export"]
 

@@ -8,18 +8,18 @@ from typing import Literal
 
 import numpy as np
 
-from deepmuon_runtime.errors import FailedError, RefusedError
-from deepmuon_runtime.physical import check_physical
+from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.physical import HIGHEST_ENERGY, LOWEST_ENERGY, first_unphysical
 from deepmuon_training.energy_transform import box_cox
 from deepmuon_training.export.onnx_export import Training
 from deepmuon_training.generators.fitted import FittedGenerator
-from deepmuon_training.generators.quantile.fit import ENERGY_MAX, QuantileSchedules, fit_quantile
+from deepmuon_training.generators.quantile.fit import QuantileSchedules, fit_quantile
 from deepmuon_training.generators.quantile.maps import QuantileGenerator
 from deepmuon_training.generators.transformer.fit import TransformerSettings, fit_transformer
 from deepmuon_training.generators.transformer.model import ChargeTable, TransformerModel, radius_table, raw_muons
 from deepmuon_training.learning.charge import fit_charge
 from deepmuon_training.learning.uniform_azimuth import check_uniform_azimuth
-from deepmuon_training.sample import MINIMUM_ENERGY, Sample
+from deepmuon_training.sample import Sample
 
 __all__ = ["ARCHITECTURES", "FEWEST_MUONS", "Azimuth", "Settings", "check_sample", "fit_generator"]
 
@@ -96,11 +96,9 @@ def check_sample(sample: Sample) -> None:
     """
     if len(sample) < FEWEST_MUONS:
         raise RefusedError(f"{len(sample)} muons are too few to learn from: at least {FEWEST_MUONS} are needed")
-    try:
-        check_physical(sample.muons, MINIMUM_ENERGY, ENERGY_MAX)
-    except FailedError as error:
-        what = str(error).removeprefix("the model gave a bad muon: ")
-        raise RefusedError(f"the sample can't be learned: muon {what}") from error
+    bad = first_unphysical(sample.muons, LOWEST_ENERGY, HIGHEST_ENERGY)
+    if bad is not None:
+        raise RefusedError(f"the sample can't be learned: muon number {bad[0]} {bad[1]}")
 
 
 def _fit_quantile(
@@ -124,8 +122,8 @@ def _quantile_notes(networks: QuantileGenerator) -> tuple[str, ...]:
     low, high = (float(energy) for energy in networks.transform.energy(np.array([clip.low, clip.high])))
     return (
         f"Above {tails.high:.0f} GeV, where the training sample thins out, the flux above E goes as "
-        f"E^-{tails.high_exponent:.2f}, up to {ENERGY_MAX:.0e} GeV; below {1000 * tails.low:.1f} MeV the flux under E "
-        f"goes as E^{tails.low_exponent:.2f}, down to 1 MeV.",
+        f"E^-{tails.high_exponent:.2f}, up to {HIGHEST_ENERGY:.0e} GeV; below {1000 * tails.low:.1f} MeV the flux "
+        f"under E goes as E^{tails.low_exponent:.2f}, down to 1 MeV.",
         f"Muons above {high:.0f} GeV share one distribution of angles and charges; so do those below {1000 * low:.1f} "
         "MeV.",
         *(() if networks.azimuth is None else (_LEARNED_AZIMUTH,)),
@@ -142,7 +140,7 @@ def _fit_transformer(
     charge = fit_charge(
         muons, transform, seed=seed, schedule=settings.charge, checkpoint=charge_checkpoint, progress=progress
     )
-    energy_range = MINIMUM_ENERGY, float(muons.kinetic_energy.max())
+    energy_range = LOWEST_ENERGY, float(muons.kinetic_energy.max())
     model = TransformerModel.stored(
         network,
         transform=transform,

@@ -10,8 +10,8 @@ from typing import Any
 
 import torch
 
-from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.muon_file.file import reason
+from deepmuon_runtime.errors import RefusedError, reason
+from deepmuon_runtime.files.whole import write_whole
 from deepmuon_training.energy_transform import EnergyTransform
 from deepmuon_training.export.onnx_export import Exportable, Mismatch, Training, export
 from deepmuon_training.generators.quantile.azimuth_fit import AzimuthDensity
@@ -23,7 +23,6 @@ from deepmuon_training.learning.charge import ChargeProbability
 from deepmuon_training.learning.condition import EnergyCondition
 from deepmuon_training.learning.power_law import PowerLawTails
 from deepmuon_training.records import from_json, to_json
-from deepmuon_training.whole_file import write_whole
 
 __all__ = ["Exported", "FittedGenerator", "export_fitted"]
 
@@ -67,7 +66,7 @@ class FittedGenerator:
         Raises
         ------
         RefusedError, FailedError
-            As `deepmuon_training.whole_file.write_whole`.
+            As `deepmuon_runtime.files.whole.write_whole`.
         """
         contents = io.BytesIO()
         parts = {

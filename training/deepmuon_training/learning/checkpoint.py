@@ -14,7 +14,7 @@ import torch
 from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import RefusedError
-from deepmuon_training.whole_file import write_whole
+from deepmuon_runtime.files.whole import write_whole
 
 __all__ = ["CHECKPOINTS", "Checkpoint", "fingerprint"]
 

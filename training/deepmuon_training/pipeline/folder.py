@@ -9,10 +9,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.muon_file.file import PARTIAL_SUFFIX, reason
+from deepmuon_runtime.errors import RefusedError, reason
+from deepmuon_runtime.files.partial import PARTIAL_SUFFIX
+from deepmuon_runtime.files.whole import write_whole
 from deepmuon_training.pipeline.settings_file import read_table, settings_from, to_toml
-from deepmuon_training.whole_file import write_whole
 
 __all__ = ["SETTINGS", "run_folder"]
 

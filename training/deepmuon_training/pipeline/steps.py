@@ -11,6 +11,7 @@ import torch
 from tqdm import tqdm
 
 from deepmuon_runtime import Generator, read_attributes
+from deepmuon_runtime.files.whole import write_whole
 from deepmuon_training.generators.fit import fit_generator
 from deepmuon_training.generators.fitted import FittedGenerator, export_fitted
 from deepmuon_training.pipeline.seeds import step_seed
@@ -18,7 +19,6 @@ from deepmuon_training.pipeline.settings import PipelineSettings
 from deepmuon_training.sample import Sample, read_sample
 from deepmuon_training.scores.evaluate import evaluate
 from deepmuon_training.transport.slab_file import transport_file
-from deepmuon_training.whole_file import write_whole
 
 __all__ = ["Layer", "carry", "draw", "export", "fit", "score"]
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import Muons
+from deepmuon_runtime.physical import HIGHEST_ENERGY, LOWEST_ENERGY
 from deepmuon_training.scores.azimuth import compare_azimuth
 from deepmuon_training.scores.classifier import classify
 from deepmuon_training.scores.evaluation import Evaluation, Spectra
@@ -43,7 +44,7 @@ def evaluate(
     raw_truth: Muons | None = None,
     generated_rate: tuple[float, float] | None = None,
     truth_rate: tuple[float, float] | None = None,
-    energy_range: tuple[float, float] = (1e-3, 1e5),
+    energy_range: tuple[float, float] = (LOWEST_ENERGY, HIGHEST_ENERGY),
     unphysical_before_mapping: float | None = None,
 ) -> Evaluation:
     """Compare generated muons with held-out ones.

@@ -8,7 +8,8 @@ from math import hypot, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
+from deepmuon_runtime.muons import MU_PLUS, Muons
+from deepmuon_runtime.physical import Fault, find_unphysical
 
 __all__ = [
     "ChargeRatio",
@@ -19,8 +20,6 @@ __all__ = [
     "count_unphysical",
     "is_physical",
 ]
-
-_UNIT_LENGTH_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -64,29 +63,9 @@ class ChargeRatio:
     sigma: float
 
 
-def _defects(muons: Muons, energy_range: tuple[float, float]) -> dict[str, NDArray[np.bool_]]:
-    squared = np.zeros(len(muons))
-    for component in (muons.u, muons.v, muons.w):
-        squared += np.square(component, dtype=np.float64)
-    return {
-        "energy_out_of_range": ~(
-            (muons.kinetic_energy >= np.float32(energy_range[0]))
-            & (muons.kinetic_energy <= np.float32(energy_range[1]))
-        ),
-        "not_of_unit_length": ~(np.abs(np.sqrt(squared) - 1) <= _UNIT_LENGTH_TOLERANCE),
-        "not_downward": ~(muons.w < 0),
-        "unknown_charge": ~((muons.pdg_id == MU_MINUS) | (muons.pdg_id == MU_PLUS)),
-    }
-
-
-def _any(defects: dict[str, NDArray[np.bool_]]) -> NDArray[np.bool_]:
-    has_any: NDArray[np.bool_] = np.logical_or.reduce(list(defects.values()))
-    return has_any
-
-
 def is_physical(muons: Muons, energy_range: tuple[float, float]) -> NDArray[np.bool_]:
     """Tell muons that can be: bool [n]. Energies [GeV] include the ends of the range."""
-    return ~_any(_defects(muons, energy_range))
+    return ~_any(find_unphysical(muons, *energy_range), len(muons))
 
 
 def count_unphysical(
@@ -96,10 +75,21 @@ def count_unphysical(
 
     Lengths are good to 1e-6. NaN and infinite values count as defects.
     """
-    defects = _defects(muons, energy_range)
-    counts = {name: int(np.count_nonzero(defect)) for name, defect in defects.items()}
-    fraction = float(np.mean(_any(defects)))
-    return UnphysicalMuons(**counts, fraction=fraction, fraction_before_mapping=fraction_before_mapping)
+    found = find_unphysical(muons, *energy_range)
+    counts = {fault: int(np.count_nonzero(bad)) for fault, bad in found.items()}
+    return UnphysicalMuons(
+        energy_out_of_range=counts.get(Fault.ENERGY, 0),
+        not_of_unit_length=counts.get(Fault.LENGTH, 0),
+        not_downward=counts.get(Fault.UPWARD, 0),
+        unknown_charge=counts.get(Fault.CHARGE, 0),
+        fraction=float(np.mean(_any(found, len(muons)))),
+        fraction_before_mapping=fraction_before_mapping,
+    )
+
+
+def _any(faults: dict[Fault, NDArray[np.bool_]], muons: int) -> NDArray[np.bool_]:
+    has_any: NDArray[np.bool_] = np.logical_or.reduce(list(faults.values())) if faults else np.zeros(muons, np.bool_)
+    return has_any
 
 
 def compare_rate(generated: tuple[float, float], held_out: tuple[float, float]) -> RateScore:

@@ -6,14 +6,14 @@ import math
 import os
 from dataclasses import dataclass, replace
 from importlib.metadata import version
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
-from deepmuon_training.sample import MINIMUM_ENERGY, Sample
+from deepmuon_runtime.muons import Muons
+from deepmuon_runtime.physical import LOWEST_ENERGY, POSITIVE_ENERGIES, first_unphysical
+from deepmuon_training.sample import Sample
 from deepmuon_training.transport.geant4_processes import PRIMARY, SlabJob, run_geant4
 from deepmuon_training.transport.material import check_material, medium
 
@@ -30,7 +30,7 @@ of those from 0.18 to 0.2, 85 of 69,569 came through 10 m.
 _THINNEST_SCREENED = 10.0  # m; through 5 m of water 4 of 82,508 muons below 0.18 GeV/m came
 
 _HIGHEST_ENERGY = 1e5  # GeV, where the tables of Geant4's processes end
-_UNIT_TOLERANCE = 1e-4  # of a direction's length: text formats have few digits
+_LENGTH_TOLERANCE = 1e-4  # of a direction's length: text formats have few digits
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def transport(
     job = SlabJob(material, float(thickness), int(seed), density, box)
     exits, sideways = run_geant4(_primaries(muons[carried]), job, processes, progress)
     upward = exits["w"] >= 0
-    below_minimum = ~upward & (exits["energy"] < np.float32(MINIMUM_ENERGY))
+    below_minimum = ~upward & (exits["energy"] < np.float32(LOWEST_ENERGY))
     survivors = exits[~upward & ~below_minimum]
     energy, u, v, w = (np.ascontiguousarray(survivors[name]) for name in ("energy", "u", "v", "w"))
     crossed = Muons(energy, u, v, w, muons.pdg_id[carried[survivors["row"]]])
@@ -212,29 +212,14 @@ def _check_arguments(sample: Sample, thickness: float, seed: int, processes: int
         raise RefusedError(f"muons under {sample.depth_m:g} m of {sample.medium} can't go on in {overburden}")
     if len(sample) == 0:
         raise RefusedError("the sample holds no muons: there is nothing to carry")
-    _check_muons(sample.muons)
+    bad = first_unphysical(sample.muons, POSITIVE_ENERGIES[0], _HIGHEST_ENERGY, length_tolerance=_LENGTH_TOLERANCE)
+    if bad is not None:
+        raise RefusedError(f"muon {bad[0]} {bad[1]}")
 
 
 def _check_box(box: tuple[float, float] | None) -> None:
     if box is not None and not all(0 < width < math.inf for width in box):
         raise RefusedError(f"a box of {box[0]} m x {box[1]} m: both widths must be positive numbers of metres")
-
-
-def _check_muons(muons: Muons) -> None:
-    energy, w = muons.kinetic_energy, muons.w
-    length = np.sqrt(muons.u.astype(float) ** 2 + muons.v.astype(float) ** 2 + w.astype(float) ** 2)
-    charged = np.isin(muons.pdg_id, (MU_MINUS, MU_PLUS))
-    # What is good, not what is bad: NaN fails a comparison.
-    _expect((energy > 0) & (energy <= _HIGHEST_ENERGY), "a kinetic energy of {} GeV, not in (0, 1e5]", energy)
-    _expect(np.abs(length - 1) <= _UNIT_TOLERANCE, "a direction of length {} instead of 1", length)
-    _expect(w < 0, "w = {}, which is not downward: w must be negative", w)
-    _expect(charged, "PDG number {} instead of 13 or -13", muons.pdg_id)
-
-
-def _expect(good: NDArray[np.bool_], complaint: str, values: NDArray[Any]) -> None:
-    if not np.all(good):
-        row = int(np.argmin(good))
-        raise RefusedError(f"muon {row} has {complaint.format(values[row])} ({np.sum(~good)} muons have)")
 
 
 def _primaries(muons: Muons) -> NDArray[np.void]:

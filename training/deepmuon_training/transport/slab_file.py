@@ -9,7 +9,8 @@ from numpy.random import SeedSequence
 from tqdm import tqdm
 
 from deepmuon_runtime.errors import FailedError
-from deepmuon_runtime.muon_file.file import MuonWriter, read_attributes, read_muons
+from deepmuon_runtime.muon_file.reader import read_attributes, read_muons
+from deepmuon_runtime.muon_file.writer import MuonWriter
 from deepmuon_training.sample import read_sample, write_sample
 from deepmuon_training.transport.material import medium
 from deepmuon_training.transport.slab import below_slab, transport

@@ -8,8 +8,8 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from deepmuon_runtime.physical import LOWEST_ENERGY
 from deepmuon_training.learning.power_law import TAIL_MUONS
-from deepmuon_training.sample import MINIMUM_ENERGY
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def test_the_power_laws_begin_where_the_sample_thins_out(generator, sample):
 
 
 def test_the_energies_of_the_outermost_levels_are_the_ends_of_the_spectrum(generator):
-    assert energies(generator, [-60.0, 60.0]) == pytest.approx([MINIMUM_ENERGY, 1e5], rel=1e-6)
+    assert energies(generator, [-60.0, 60.0]) == pytest.approx([LOWEST_ENERGY, 1e5], rel=1e-6)
 
 
 @given(energy=st.floats(1e-3, 1e5))

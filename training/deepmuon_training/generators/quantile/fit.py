@@ -10,6 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from deepmuon_runtime.muons import Muons
+from deepmuon_runtime.physical import LOWEST_ENERGY
 from deepmuon_training.energy_transform import EnergyTransform
 from deepmuon_training.generators.quantile.azimuth_fit import AZIMUTH_SCHEDULE, fit_azimuth
 from deepmuon_training.generators.quantile.maps import QuantileGenerator
@@ -18,11 +19,10 @@ from deepmuon_training.learning.charge import CHARGE_SCHEDULE, fit_charge
 from deepmuon_training.learning.descent import Schedule
 from deepmuon_training.learning.power_law import PowerLawTails
 from deepmuon_training.learning.validation import split
-from deepmuon_training.sample import MINIMUM_ENERGY
 
-__all__ = ["ENERGY_MAX", "QuantileSchedules", "fit_quantile"]
+__all__ = ["HIGHEST_ENERGY", "QuantileSchedules", "fit_quantile"]
 
-ENERGY_MAX = 1e5
+HIGHEST_ENERGY = 1e5
 """Where the power law of the spectrum ends [GeV]."""
 
 
@@ -86,7 +86,7 @@ def fit_quantile(
         azimuth = fit_azimuth(
             muons, transform, seed=seed, schedule=schedules.azimuth, checkpoint=azimuth_file, progress=progress
         )
-    tails = PowerLawTails.fit(energy, energy_min=MINIMUM_ENERGY, energy_max=ENERGY_MAX)
+    tails = PowerLawTails.fit(energy, energy_min=LOWEST_ENERGY, energy_max=HIGHEST_ENERGY)
     torch.manual_seed(seed)
     generator = QuantileGenerator(transform, tails, charge, azimuth)
     y = transform.pre_tanh(energy)

@@ -1,0 +1,266 @@
+"""Writes muon files: complete under their name, or not there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from datetime import datetime, timezone
+from importlib.metadata import version
+from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple
+from zlib import crc32
+
+import h5py
+import numpy as np
+
+from deepmuon_runtime.errors import RefusedError, reason
+from deepmuon_runtime.files.early_flush import EarlyFlush
+from deepmuon_runtime.files.partial import PartialFile
+from deepmuon_runtime.files.quiet import QuietFile
+from deepmuon_runtime.muon_file.checksum import joined_crc32
+from deepmuon_runtime.muon_file.format import BYTES_PER_MUON, CHECKSUM, COLUMNS, FORMAT, FORMAT_VERSION
+from deepmuon_runtime.muon_file.reader import checksums_of, opened
+from deepmuon_runtime.muon_file.virtual import Source, create_virtual_column
+from deepmuon_runtime.muons import Muons
+
+__all__ = ["MuonWriter", "write_muons"]
+
+LARGEST_CHUNK = 1 << 17  # muons of one HDF5 chunk: smaller ones cost time and memory, larger ones gain nothing
+SMALLEST_CHUNK = 1 << 10  # but a file of a few muons should not carry a large empty chunk
+
+
+class MuonWriter:
+    """Writes a muon file piece by piece, and gives it its name only when it is complete.
+
+    Use it in a `with` statement. If the body raises, or is interrupted, nothing is left behind.
+
+    Parameters
+    ----------
+    path
+        The file to be written; its folder must exist.
+    attributes
+        What the file says of its muons: `depth_m` and `medium` at least; strings, numbers, booleans, or lists
+        of strings. `count` and `created` are added, `created_by` unless given, and
+        `live_time_s_m2 = count / rate_hz_per_m2` where the rate is.
+    overwrite
+        Whether an existing file is replaced, at the moment when the new one is complete.
+
+    Attributes
+    ----------
+    path : Path
+        The absolute path of the file, links followed.
+    count : int
+        Muons written so far.
+
+    Raises
+    ------
+    RefusedError
+        On construction and entry, if `path` can't be written or an attribute is missing.
+    FailedError
+        Later, if writing fails (disk full), or another process has written `path` meanwhile.
+    """
+
+    # HDF5 calls back into Python (QuietFile), and must not meet a KeyboardInterrupt there. Python handles
+    # signals in the main thread only, so all calls of HDF5 are made by a thread of their own.
+
+    def __init__(self, path: str | Path, attributes: Mapping[str, object], overwrite: bool = False) -> None:
+        self._partial = PartialFile(path, overwrite)
+        self.path = self._partial.target
+        missing = [name for name in ("depth_m", "medium") if name not in attributes]
+        if missing:
+            raise RefusedError(f"a muon file must say its {' and '.join(missing)}: add it to the attributes")
+        self.count = 0
+        self._attributes = dict(attributes)
+        self._columns: dict[str, h5py.Dataset] = {}
+        self._checksums = dict.fromkeys(COLUMNS, 0)
+
+    def __enter__(self) -> MuonWriter:
+        """Create the temporary file."""
+        self._partial.begin()
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="muon-writer")
+        try:
+            self._in_thread(self._open)
+        except BaseException as error:
+            self._discard()
+            if isinstance(error, OSError):
+                raise RefusedError(f"{self.path} can't be written: {reason(error)}") from error
+            raise
+        return self
+
+    def append(self, muons: Muons) -> None:
+        """Write muons after those already written.
+
+        Raises
+        ------
+        FailedError
+            If they can't be written, for instance on a full disk.
+        """
+        with self._partial.failures():
+            self._in_thread(self._append, muons)
+
+    def refer(self, paths: Iterable[str | Path], progress: Callable[[int], object] = lambda _: None) -> None:
+        """Take all muons from other muon files, which keep them, instead of `append`.
+
+        The file finds them by their paths relative to its folder.
+
+        Parameters
+        ----------
+        paths
+            The files, in the order of their muons.
+        progress
+            Called with 0 again and again, from another thread.
+
+        Raises
+        ------
+        RefusedError
+            If one of them can't be read, or keeps its muons in other files itself.
+        FailedError
+            As for `append`.
+        """
+        with self._partial.failures():
+            self._in_thread(self._refer, paths, progress)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Publish the file, or remove it if the body raised."""
+        try:
+            if kind is None:
+                with self._partial.failures():
+                    self._in_thread(self._finish)
+                    self._partial.publish()
+        finally:
+            self._discard()
+
+    def _in_thread(self, function: Callable[..., None], *arguments: object) -> None:
+        self._thread.submit(function, *arguments).result()
+
+    def _open(self) -> None:
+        self._backing = QuietFile(str(self._partial.path))
+        self._partial.hold(self._backing.fileno())
+        self._flush = EarlyFlush(self._backing.fileno())
+        # Whole chunks go straight to the file: a cache would only copy them once more.
+        self._file = h5py.File(self._backing, "w", rdcc_nbytes=0)
+
+    def _append(self, muons: Muons) -> None:
+        if not self._columns:
+            self._create_columns(len(muons))
+        end = self.count + len(muons)
+        for name, column in self._columns.items():
+            values = np.ascontiguousarray(getattr(muons, name), COLUMNS[name][0])
+            column.resize((end,))
+            column[self.count : end] = values
+            self._checksums[name] = crc32(values.data, self._checksums[name])
+        self.count = end
+        self._raise_fault()
+        self._flush.wrote(len(muons) * BYTES_PER_MUON)
+
+    def _create_columns(self, first_length: int) -> None:
+        chunk = min(max(first_length, SMALLEST_CHUNK), LARGEST_CHUNK)
+        group = self._file.create_group("muons")
+        for name, (dtype, _) in COLUMNS.items():
+            self._columns[name] = group.create_dataset(name, shape=(0,), maxshape=(None,), chunks=(chunk,), dtype=dtype)
+
+    def _refer(self, paths: Iterable[str | Path], progress: Callable[[int], object]) -> None:
+        parts = []
+        for path in paths:
+            progress(0)
+            part = self._part(path)
+            if part.length:
+                parts.append(part)
+        if not parts:
+            return
+        ends = np.cumsum([part.length for part in parts]).tolist()
+        group = self._file.create_group("muons")
+        for name, (dtype, _) in COLUMNS.items():
+            sources = [
+                Source(part.path, f"muons/{name}", end - part.length, end)
+                for part, end in zip(parts, ends, strict=True)
+            ]
+            progress(0)
+            self._columns[name] = create_virtual_column(group, name, dtype, sources)
+            self._checksums[name] = joined_crc32((part.checksums[name], part.length * dtype.itemsize) for part in parts)
+        self.count = ends[-1]
+        self._raise_fault()
+
+    def _part(self, path: str | Path) -> _Part:
+        with opened(path) as group:
+            if any(group[name].is_virtual for name in COLUMNS):
+                raise RefusedError(f"{path} keeps its muons in other files: name those instead")
+            relative = os.path.relpath(os.path.realpath(path), self.path.parent)
+            return _Part(Path(relative), len(group["pdg_id"]), checksums_of(group))
+
+    def _finish(self) -> None:
+        """Write the attributes, and all that is in memory to the disk."""
+        if not self._columns:
+            self._create_columns(0)
+        for name, column in self._columns.items():
+            column.attrs["units"] = COLUMNS[name][1]
+            column.attrs[CHECKSUM] = np.uint32(self._checksums[name])
+        self._file.attrs["format"] = FORMAT
+        self._file.attrs["format_version"] = FORMAT_VERSION
+        for name, value in self._all_attributes().items():
+            if isinstance(value, (list, tuple)):
+                self._file["muons"].attrs.create(name, list(value), dtype=h5py.string_dtype())
+            else:
+                self._file["muons"].attrs[name] = value
+        self._file.close()
+        self._raise_fault()
+        self._flush.finish()
+
+    def _all_attributes(self) -> dict[str, object]:
+        attributes = {"created_by": f"deepmuon-runtime {version('deepmuon-runtime')}", **self._attributes}
+        attributes["count"] = self.count
+        attributes["created"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
+        rate = attributes.get("rate_hz_per_m2")
+        if isinstance(rate, (int, float, np.number)) and rate > 0:
+            attributes["live_time_s_m2"] = self.count / float(rate)
+        return attributes
+
+    def _raise_fault(self) -> None:
+        if self._backing.error is not None:
+            raise self._backing.error
+
+    def _discard(self) -> None:
+        """Let go of the temporary file, and of its temporary name."""
+        try:
+            self._in_thread(self._close)
+        finally:
+            self._thread.shutdown()
+            self._partial.remove()
+
+    def _close(self) -> None:
+        for file in (getattr(self, name, None) for name in ("_file", "_flush", "_backing")):
+            if file is not None:
+                with suppress(OSError, RuntimeError):  # what it holds is on the disk already, or thrown away
+                    file.close()
+
+
+def write_muons(path: str | Path, muons: Muons, attributes: Mapping[str, object], overwrite: bool = False) -> None:
+    """Write muons to a new file.
+
+    Parameters
+    ----------
+    path, attributes, overwrite
+        As for `MuonWriter`.
+    muons
+        The muons.
+
+    Raises
+    ------
+    RefusedError, FailedError
+        As for `MuonWriter`.
+    """
+    with MuonWriter(path, attributes, overwrite) as writer:
+        writer.append(muons)
+
+
+class _Part(NamedTuple):
+    """A file that holds muons of another one."""
+
+    path: Path
+    length: int
+    checksums: dict[str, int]
