@@ -12,23 +12,23 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import click
-import torch
 
-from deepmuon_runtime import Generator
 from deepmuon_training.data.cry import HELD_OUT_CRY_MUONS, read_cry
 from deepmuon_training.data.smoothing import StepSmoother, smoothed
 from deepmuon_training.generators.fit import fit_generator
-from deepmuon_training.generators.fitted import export_fitted
+from deepmuon_training.generators.fitted import FittedGenerator, export_fitted
+from deepmuon_training.generators.registry import ARCHITECTURES
+from deepmuon_training.pipeline.step import Step, run_steps
 from deepmuon_training.release.card import card, manifest_entry
 from deepmuon_training.release.vectors import muon_vectors
 from deepmuon_training.reports.pictures import draw_pictures
 from deepmuon_training.sample import Sample, read_sample, write_sample
-from deepmuon_training.scores.evaluate import evaluate
 from deepmuon_training.scores.evaluation import Evaluation
+from deepmuon_training.scores.model_evaluation import evaluate_model
 from deepmuon_training.transport.slab import transport
 
 REPOSITORY = Path(__file__).parents[1]
@@ -47,25 +47,33 @@ DEEP = 30
 DEEP_ROWS = {"testing": slice(8_000_000), "training": slice(8_000_000, 24_000_000)}
 """Which muons of the larger run test and train the generators of the deep."""
 
+PARTS = ("training", "testing")
+
+Make = Callable[[Path, bool], None]
+"""Makes the result of a step, as `deepmuon_training.pipeline.step.Step` wants it."""
+
 
 @click.command(help=__doc__)
 @click.option("--cry", required=True, type=click.Path(exists=True, path_type=Path), help="CRY's muons at sea level.")
 @click.option("--more-cry", type=click.Path(exists=True, path_type=Path), help="More of them, for 30 m and deeper.")
 @click.option("--work", required=True, type=click.Path(path_type=Path), help="Folder for samples and checkpoints.")
 @click.option("--depth", "depths", multiple=True, type=int, default=DEPTHS, show_default=True)
-@click.option("--architecture", "architectures", multiple=True, default=("quantile", "transformer"), show_default=True)
+@click.option("--architecture", "architectures", multiple=True, default=tuple(ARCHITECTURES), show_default=True)
 def main(cry: Path, more_cry: Path | None, work: Path, depths: tuple[int, ...], architectures: tuple[str, ...]) -> None:
     """Make each model of each depth, then the manifest."""
-    torch.set_num_threads(1)  # other numbers of threads round otherwise
-    make_sea_level(cry, work)
-    if more_cry and max(depths) >= DEEP:
-        make_deep(cry, more_cry, work)
-    for depth in depths:
-        for part in ("training", "testing"):
-            make_sample(work, part, depth)
-        for architecture in architectures:
-            make_model(work, architecture, depth)
+    if more_cry is None and max(depths) >= DEEP:
+        raise click.UsageError(f"--more-cry is needed from {DEEP} m on")
+    for folder in (work / "samples", *(work / name for name in names(depths, architectures))):
+        folder.mkdir(parents=True, exist_ok=True)
+    run_steps([*sample_steps(cry, more_cry, work, max(depths)), *model_steps(work, depths, architectures)], click.echo)
+    for name in names(depths, architectures):
+        release(work, name)
     write_manifest()
+
+
+def names(depths: tuple[int, ...], architectures: tuple[str, ...]) -> list[str]:
+    """Return the names of the models."""
+    return [f"{architecture}-{depth}m" for depth in depths for architecture in architectures]
 
 
 def sample_file(work: Path, part: str, depth: int, kind: str = "") -> Path:
@@ -73,99 +81,131 @@ def sample_file(work: Path, part: str, depth: int, kind: str = "") -> Path:
     return work / "samples" / f"{part}-{depth}m{kind}.h5"
 
 
+def sample_steps(cry: Path, more_cry: Path | None, work: Path, deepest: int) -> Iterator[Step]:
+    """Yield the steps that make the samples, from sea level to the deepest."""
+    yield Step("smooth", "CRY", sample_file(work, "testing", 0), lambda *_: make_sea_level(cry, work))
+    for depth in range(LAYER, deepest + 1, LAYER):
+        for part in PARTS:
+            path = sample_file(work, part, depth)
+            if depth == DEEP:
+                assert more_cry is not None
+                yield Step("transport", f"to {depth} m", path, _deep(cry, more_cry, path, part))
+            else:
+                yield Step("transport", f"to {depth} m", path, _below(work, path, part, depth))
+
+
 def make_sea_level(cry: Path, work: Path) -> None:
     """Smooth CRY's muons, by maps fitted on the training part; the held-out ones are kept raw as well."""
-    if sample_file(work, "testing", 0).exists():
-        return
-    (work / "samples").mkdir(parents=True, exist_ok=True)
     training = read_cry(cry, slice(-HELD_OUT_CRY_MUONS))
     testing = read_cry(cry, slice(-HELD_OUT_CRY_MUONS, None))
     smooth = StepSmoother(training.muons)
-    write_sample(sample_file(work, "testing", 0, "-raw"), testing)
-    for part, sample in (("training", training), ("testing", testing)):
-        write_sample(sample_file(work, part, 0), smoothed(sample, smooth))
+    write_sample(sample_file(work, "testing", 0, "-raw"), testing, overwrite=True)
+    write_sample(sample_file(work, "training", 0), smoothed(training, smooth), overwrite=True)
+    write_sample(sample_file(work, "testing", 0), smoothed(testing, smooth))
 
 
-def make_deep(cry: Path, more_cry: Path, work: Path) -> None:
+def _deep(cry: Path, more_cry: Path, path: Path, part: str) -> Make:
     """Carry muons of the larger run to where the deep begins, smoothed by the maps of the other's training part."""
-    parts = [part for part in DEEP_ROWS if not sample_file(work, part, DEEP).exists()]
-    smooth = StepSmoother(read_cry(cry, slice(-HELD_OUT_CRY_MUONS)).muons) if parts else None
-    for part in parts:
+
+    def make(_: Path, progress: bool) -> None:
+        smooth = StepSmoother(read_cry(cry, slice(-HELD_OUT_CRY_MUONS)).muons)
         sea_level = smoothed(read_cry(more_cry, DEEP_ROWS[part]), smooth)
-        write_sample(sample_file(work, part, DEEP), transport(sea_level, DEEP, seed=transport_seed(part, DEEP)).sample)
+        carried = transport(sea_level, DEEP, seed=transport_seed(part, DEEP), progress=progress)
+        write_sample(path, carried.sample)
+
+    return make
 
 
-def make_sample(work: Path, part: str, depth: int) -> None:
-    """Carry the muons of the layer above through ten metres of water, as far up as need be."""
-    path = sample_file(work, part, depth)
-    if path.exists():
-        return
-    make_sample(work, part, depth - LAYER)
-    above = read_sample(sample_file(work, part, depth - LAYER))
-    write_sample(path, transport(above, LAYER, seed=transport_seed(part, depth)).sample)
+def _below(work: Path, path: Path, part: str, depth: int) -> Make:
+    """Carry the muons of the layer above through ten metres of water."""
+
+    def make(_: Path, progress: bool) -> None:
+        above = read_sample(sample_file(work, part, depth - LAYER))
+        write_sample(path, transport(above, LAYER, seed=transport_seed(part, depth), progress=progress).sample)
+
+    return make
 
 
 def transport_seed(part: str, depth: int) -> int:
     """Return a seed that no other slab has."""
-    return depth + ("training", "testing").index(part)
+    return depth + PARTS.index(part)
 
 
-def make_model(work: Path, architecture: str, depth: int) -> None:
-    """Fit and export one model, then evaluate it and write its card."""
-    name = f"{architecture}-{depth}m"
-    folder = work / name
-    folder.mkdir(parents=True, exist_ok=True)
-    sample = read_sample(sample_file(work, "training", depth))
-    notes = folder / "notes.json"
-    if not notes.exists():
-        notes.write_text(json.dumps(fit_and_export(architecture, sample, folder / f"{name}.onnx")))
-    path = RELEASED / f"{name}.onnx"
+def model_steps(work: Path, depths: tuple[int, ...], architectures: tuple[str, ...]) -> Iterator[Step]:
+    """Yield the steps that fit, export and score each model."""
+    for name in names(depths, architectures):
+        folder = work / name
+        generator = folder / f"{name}.pt"
+        yield Step("fit", name, generator, _fit(work, generator))
+        yield Step("export", name, folder / "notes.json", _export(generator, folder / f"{name}.onnx"))
+        yield Step("score", name, folder / "evaluation.json", _score(work, generator))
+
+
+def _fit(work: Path, generator: Path) -> Make:
+    architecture, depth = architecture_and_depth(generator.stem)
+
+    def make(saved: Path, progress: bool) -> None:
+        sample = read_sample(sample_file(work, "training", depth))
+        fit_generator(sample, architecture, seed=SEED, checkpoint_folder=saved, progress=progress).save(generator)
+
+    return make
+
+
+def _export(generator: Path, model: Path) -> Make:
+    def make(_: Path, progress: bool) -> None:
+        exported = export_fitted(FittedGenerator.load(generator), model, overwrite=True)
+        (generator.parent / "notes.json").write_text(json.dumps(exported.notes))
+
+    return make
+
+
+def _score(work: Path, generator: Path) -> Make:
+    """Compare 20,000,000 muons with the held-out ones."""
+    _, depth = architecture_and_depth(generator.stem)
+    raw = sample_file(work, "testing", depth, "-raw")
+
+    def make(_: Path, progress: bool) -> None:
+        evaluation = evaluate_model(
+            generator.with_suffix(".onnx"),
+            read_sample(sample_file(work, "testing", depth)),
+            EVALUATED_MUONS,
+            seed=SEED,
+            raw=read_sample(raw) if raw.exists() else None,
+            unphysical_before_mapping=FittedGenerator.load(generator).unphysical_before_mapping,
+        )
+        (generator.parent / "evaluation.json").write_text(evaluation.to_json())
+
+    return make
+
+
+def architecture_and_depth(name: str) -> tuple[str, int]:
+    """Return what the name of a model says."""
+    architecture, _, depth = name.partition("-")
+    return architecture, int(depth.removesuffix("m"))
+
+
+def release(work: Path, name: str) -> None:
+    """Put a model where it is released, with its test vectors, scores, pictures and card."""
+    (architecture, depth), folder, path = architecture_and_depth(name), work / name, RELEASED / f"{name}.onnx"
     shutil.copyfile(folder / path.name, path)
     (VECTORS / f"{name}.json").write_text(muon_vectors(path), encoding="utf-8")
-    evaluate_model(work, path, sample, **json.loads(notes.read_text()))
-
-
-def fit_and_export(architecture: str, sample: Sample, path: Path) -> dict[str, Any]:
-    """Write the ONNX file; return what the fit and the export know of it."""
-    generator = fit_generator(sample, architecture, seed=SEED, checkpoint_folder=path.parent)
-    exported = export_fitted(generator, path, overwrite=True)
-    return {"notes": exported.notes, "unphysical_before_mapping": exported.unphysical_before_mapping}
-
-
-def evaluate_model(
-    work: Path, path: Path, sample: Sample, notes: list[str], unphysical_before_mapping: float | None
-) -> None:
-    """Compare 20,000,000 muons with the held-out ones, and write scores, pictures and card."""
-    generator = Generator.open(file=path, device="cpu")
-    model, depth = generator.model, round(sample.depth_m)
-    testing = read_sample(sample_file(work, "testing", depth))
-    raw = sample_file(work, "testing", depth, "-raw")
-    evaluation = evaluate(
-        generator.sample(EVALUATED_MUONS, seed=SEED),
-        testing.muons,
-        seed=SEED,
-        muons_per_draw=model.muons_per_draw,
-        raw_truth=read_sample(raw).muons if raw.exists() else None,
-        generated_rate=(sample.rate, sample.rate_uncertainty),
-        truth_rate=(testing.rate, testing.rate_uncertainty),
-        energy_range=(model.energy_min_gev, model.energy_max_gev),
-        unphysical_before_mapping=unphysical_before_mapping,
-    )
-    pictures = EVALUATIONS / path.stem
+    evaluation = Evaluation.from_json((folder / "evaluation.json").read_text())
+    (EVALUATIONS / f"{name}.json").write_text(evaluation.to_json())
+    pictures = EVALUATIONS / name
     pictures.mkdir(parents=True, exist_ok=True)
-    (EVALUATIONS / f"{path.stem}.json").write_text(evaluation.to_json())
-    draw_pictures(evaluation, pictures, title=f"{model.architecture}, {depth} m")
-    write_card(path, evaluation, sample, notes)
+    draw_pictures(evaluation, pictures, title=f"{architecture}, {depth} m")
+    write_card(path, evaluation, read_sample(sample_file(work, "training", depth), 0, 0), folder / "notes.json")
 
 
-def write_card(path: Path, evaluation: Evaluation, sample: Sample, notes: list[str]) -> None:
+def write_card(path: Path, evaluation: Evaluation, sample: Sample, notes: Path) -> None:
     """Write the model's card beside its file, and show it."""
-    depth, architecture = round(sample.depth_m), path.stem.partition("-")[0]
+    architecture, depth = architecture_and_depth(path.stem)
     more = "--more-cry cry_40M.h5 " if depth >= DEEP else ""
     command = (
         f"python models/make.py --cry cry_sea_level.h5 {more}--work work --depth {depth} --architecture {architecture}"
     )
-    text = card(path, evaluation, command=command, provenance=sample.provenance, notes=notes)
+    known = json.loads(notes.read_text())
+    text = card(path, evaluation, command=command, provenance=sample.provenance, notes=known)
     path.with_suffix(".md").write_text(text)
     click.echo(text)
 

@@ -57,12 +57,8 @@ def explain(fault: Fault, energy_min_gev: float, energy_max_gev: float) -> str:
     """Return a fault in words that follow "the muon", given the range of the kinetic energy."""
     if fault is not Fault.ENERGY:
         return str(fault.value)
-    known = {
-        POSITIVE_ENERGIES: "that is not finite and above 0",
-        NOT_NEGATIVE_ENERGIES: "that is negative or not finite",
-    }
     outside = f"outside {np.float32(energy_min_gev):g} to {np.float32(energy_max_gev):g} GeV"
-    return f"{fault.value} {known.get((energy_min_gev, energy_max_gev), outside)}"
+    return f"{fault.value} {_UNBOUNDED.get((energy_min_gev, energy_max_gev), outside)}"
 
 
 def find_unphysical(

@@ -20,7 +20,6 @@ from deepmuon_runtime import Generator, Muons
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_training.commands.train import train
 from deepmuon_training.learning import charge
-from deepmuon_training.learning.checkpoint import CHECKPOINTS
 from deepmuon_training.mountain import behind_mountain
 from deepmuon_training.sample import Sample, write_sample
 from deepmuon_training.scores import evaluate
@@ -162,7 +161,6 @@ def test_a_checkpoint_folder_keeps_what_is_not_a_checkpoint(run):
     Path("kept/thesis.tex").write_text("...")
     run(FIT + " --checkpoint kept")
     assert [path.name for path in Path("kept").iterdir()] == ["thesis.tex"]
-    assert len(CHECKPOINTS) == len(set(CHECKPOINTS))
 
 
 def test_an_azimuth_that_is_not_uniform_is_learned_only_if_wanted(run, sample):

@@ -21,8 +21,10 @@ from onnx.reference import ReferenceEvaluator
 from deepmuon_runtime import Generator
 from deepmuon_runtime.errors import FailedError, RefusedError
 from deepmuon_runtime.latents.philox import latents
+from deepmuon_training.export.exportable import Exportable
 from deepmuon_training.export.graph import Graph
-from deepmuon_training.export.onnx_export import Exportable, Training, export
+from deepmuon_training.export.metadata import Training
+from deepmuon_training.export.onnx_export import export
 from deepmuon_training.generators.transformer.fit import TransformerSettings
 from deepmuon_training.generators.transformer.model import TransformerModel
 from deepmuon_training.generators.transformer.network import LATENTS, Transformer

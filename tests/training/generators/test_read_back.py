@@ -9,7 +9,7 @@ from support.tiny_models import tiny_model
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.latents.philox import latents
-from deepmuon_training.export.onnx_export import Exportable
+from deepmuon_training.export.exportable import Exportable
 from deepmuon_training.generators.read_back import read_back
 
 

@@ -262,7 +262,7 @@ def test_a_direct_plan_carries_each_layers_own_muons(folder: Path):
     settings = replace(read_pipeline_settings(folder / "tiny.toml"), direct=True, layers=2)
     pipeline = plan(settings, folder / "sea.h5", folder / "nowhere")
     assert [layer.carried.name for layer in pipeline.layers[:2]] == ["sea.h5", "muons-1m.h5"]
-    assert {step.kind for step in pipeline.steps} == {"fit", "export", "transport"}
+    assert {step.kind for step in pipeline.layer} == {"fit", "export", "transport"}
     assert not (folder / "nowhere").exists()
 
 
@@ -348,6 +348,6 @@ def test_a_slab_that_too_few_muons_cross_ends_the_run(folder: Path, tmp_path: Pa
     settings = replace(read_pipeline_settings(folder / "tiny.toml"), layer_m=60.0, direct=True)
     pipeline = plan(settings, folder / "sea.h5", tmp_path / "run")
     (tmp_path / "run").mkdir()
-    pipeline.steps[2].run(progress=False)
+    pipeline.layer[2].run(progress=False)
     with pytest.raises(FailedError, match=r"fit what came through at 60 m: \d+ muons are too few to learn from"):
-        pipeline.steps[3].run(progress=False)
+        pipeline.layer[3].run(progress=False)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from deepmuon_training.export.onnx_export import Exportable
+from deepmuon_training.export.exportable import Exportable
 from deepmuon_training.release.vectors import MARGIN, MUONS, muon_vectors
 
 REPOSITORY = Path(__file__).parents[3]

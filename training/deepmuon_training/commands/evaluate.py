@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from deepmuon_cli.options.quantities import muon_number, seed_number
-
-if TYPE_CHECKING:
-    from deepmuon_runtime import Generator, Muons
 
 __all__ = ["command"]
 
@@ -65,46 +61,30 @@ def command(
     for path in filter(None, (output, json_output)):
         check_output(path, overwrite)
 
+    from tqdm import tqdm
+
     from deepmuon_runtime import Generator
     from deepmuon_runtime.files.whole import write_whole
     from deepmuon_training.reports.report import html_report
     from deepmuon_training.sample import read_sample
-    from deepmuon_training.scores.evaluate import FEWEST_MUONS, evaluate
+    from deepmuon_training.scores.evaluate import FEWEST_MUONS
+    from deepmuon_training.scores.model_evaluation import evaluate_model
     from deepmuon_training.scores.scorecard import markdown_scorecard
 
-    generator, truth = Generator.open(file=model, device="cpu"), read_sample(held_out)
-    facts = generator.model
+    facts, truth = Generator.open(file=model, device="cpu").model, read_sample(held_out)
     number = number or max(FEWEST_MUONS, min(MOST_MUONS, TIMES_HELD_OUT * len(truth)))
-    evaluation = evaluate(
-        _drawn(generator, number, seed, progress=not quiet and sys.stderr.isatty()),
-        truth.muons,
-        seed=seed,
-        muons_per_draw=facts.muons_per_draw,
-        generated_rate=_rate(facts.rate_hz_per_m2, facts.rate_uncertainty_hz_per_m2),
-        truth_rate=_rate(truth.rate, truth.rate_uncertainty),
-        energy_range=(facts.energy_min_gev, facts.energy_max_gev),
-    )
+    hidden = quiet or not sys.stderr.isatty()
+    with tqdm(total=number, desc="drawing", unit="muon", unit_scale=True, disable=hidden) as bar:
+
+        def drawn(muons: int) -> None:
+            bar.update(muons)
+            if bar.n == number:
+                bar.set_description("drawn, scoring takes a minute or two")
+
+        evaluation = evaluate_model(model, truth, number, seed=seed, progress=drawn)
     write_whole(output, html_report(evaluation, facts, truth, str(held_out)).encode(), overwrite=overwrite)
     if json_output is not None:
         write_whole(json_output, evaluation.to_json().encode(), overwrite=overwrite)
     if not quiet:
         click.echo(markdown_scorecard(evaluation, facts.architecture))
         click.echo(f"{output}: {number:,} generated muons against {len(truth):,} of {held_out}, seed {seed}")
-
-
-def _drawn(generator: Generator, number: int, seed: int, progress: bool) -> list[Muons]:
-    """Draw muons in pieces, with a bar on stderr."""
-    from tqdm import tqdm
-
-    pieces = []
-    with tqdm(total=number, desc="drawing", unit="muon", unit_scale=True, disable=not progress) as bar:
-        for piece in generator.chunks(number, seed):
-            pieces.append(piece)
-            bar.update(len(piece))
-        bar.set_description("drawn, scoring takes a minute or two")
-    return pieces
-
-
-def _rate(rate: float | None, uncertainty: float | None) -> tuple[float, float] | None:
-    """Return a rate with its uncertainty, 0 where nobody stated one."""
-    return None if rate is None else (rate, uncertainty or 0.0)

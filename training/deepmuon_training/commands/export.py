@@ -35,11 +35,8 @@ def command(generator: Path, output: Path, overwrite: bool, quiet: bool) -> None
 
     check_output(output, overwrite)
 
-    import torch
-
     from deepmuon_training.generators.fitted import FittedGenerator, export_fitted
 
-    torch.set_num_threads(1)  # other numbers of threads round otherwise
     fitted = FittedGenerator.load(generator)
     exported = export_fitted(fitted, output, overwrite=overwrite)
     if not quiet:

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from deepmuon_cli.options.quantities import seed_number
+from deepmuon_training.generators.registry import ARCHITECTURES
 
 __all__ = ["command"]
 
@@ -19,7 +20,8 @@ FILE = click.Path(path_type=Path)
 @click.option("-o", "--output", type=FILE, metavar="FILE", required=True, help="The generator, such as generator.pt.")
 @click.option(
     "--architecture",
-    type=click.Choice(["quantile", "transformer"]),
+    "architecture_name",
+    type=click.Choice(list(ARCHITECTURES)),
     default="quantile",
     show_default=True,
     help="quantile: independent muons, small and fast. transformer: the paper's.",
@@ -43,7 +45,7 @@ FILE = click.Path(path_type=Path)
 def command(
     muons: Path,
     output: Path,
-    architecture: str,
+    architecture_name: str,
     width: int | None,
     azimuth: str | None,
     seed: int,
@@ -84,28 +86,27 @@ def command(
     from deepmuon_runtime.files.output import check_output
 
     check_output(output, overwrite)
-    if width is not None and architecture != "transformer":
+    if width is not None and architecture_name != "transformer":
         raise click.UsageError("-d goes with --architecture transformer: a quantile generator has no width")
-    if azimuth is not None and architecture != "quantile":
+    if azimuth is not None and architecture_name != "quantile":
         raise click.UsageError("--azimuth goes with --architecture quantile: a transformer always learns it")
 
-    import torch
-
-    from deepmuon_training.generators.fit import ARCHITECTURES, fit_generator
+    from deepmuon_training.generators.fit import fit_generator
+    from deepmuon_training.generators.registry import architecture
     from deepmuon_training.pipeline.settings_file import read_table, settings_from
     from deepmuon_training.sample import read_sample
 
+    kind = architecture(architecture_name)
     table = {} if settings is None else read_table(settings)
     if width is not None:
         table["d"] = width
-    chosen = settings_from(ARCHITECTURES[architecture](), table, "the settings" if settings is None else str(settings))
-    torch.set_num_threads(1)  # other numbers of threads round otherwise
+    chosen = settings_from(kind.settings(), table, "the settings" if settings is None else str(settings))
     sample = read_sample(muons)
     folder = _made(checkpoint or output.with_name(output.name + ".checkpoint"))
     try:
         generator = fit_generator(
             sample,
-            architecture,
+            architecture_name,
             seed=seed,
             settings=chosen,
             azimuth="learned" if azimuth == "learned" else "uniform",
@@ -113,11 +114,12 @@ def command(
             progress=not quiet and sys.stderr.isatty(),
         )
         generator.save(output, overwrite=overwrite)
-        _clear(folder)
+        for name in kind.checkpoints:
+            (folder / name).unlink(missing_ok=True)
     finally:
         _remove_if_empty(folder)
     if not quiet:
-        click.echo(f"{output}: {architecture}, fitted to {len(sample):,} muons, seed {seed}")
+        click.echo(f"{output}: {architecture_name}, fitted to {len(sample):,} muons, seed {seed}")
         click.echo(f"next: deepmuon-train export {output} -o model.onnx")
 
 
@@ -129,14 +131,6 @@ def _made(folder: Path) -> Path:
     except OSError as error:
         raise RefusedError(f"no checkpoint can be kept in {folder}: {reason(error)}") from error
     return folder
-
-
-def _clear(folder: Path) -> None:
-    """Remove the checkpoints of a finished fit."""
-    from deepmuon_training.learning.checkpoint import CHECKPOINTS
-
-    for name in CHECKPOINTS:
-        (folder / name).unlink(missing_ok=True)
 
 
 def _remove_if_empty(folder: Path) -> None:

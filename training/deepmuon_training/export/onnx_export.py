@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from importlib.metadata import version
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 import onnx
@@ -18,12 +16,11 @@ from deepmuon_runtime.errors import FailedError
 from deepmuon_runtime.files.output import check_output
 from deepmuon_runtime.files.whole import write_whole
 from deepmuon_runtime.latents.philox import latents
-from deepmuon_runtime.model.metadata import CONTRACT_VERSION, METADATA_PREFIX
-from deepmuon_training.energy_transform import LAMBDA
-from deepmuon_training.export.graph import Graph
-from deepmuon_training.sample import Sample
+from deepmuon_runtime.model.metadata import METADATA_PREFIX
+from deepmuon_training.export.exportable import Exportable
+from deepmuon_training.export.metadata import Training, metadata
 
-__all__ = ["Exportable", "Mismatch", "Training", "compare", "export"]
+__all__ = ["Mismatch", "compare", "export"]
 
 COMPARED_MUONS = 100_000
 
@@ -31,73 +28,6 @@ ROUNDING = 8.0
 """How much farther than PyTorch in float32 the ONNX output may be from PyTorch in float64."""
 
 _LAST_BIT = 2**-23
-
-LICENCE = "BSD-3-Clause"
-
-
-class Exportable(Protocol):
-    """A generator as stored numbers: what an ONNX file holds.
-
-    ``__call__`` evaluates them in PyTorch: latents [draws, latent_size] to kinetic energy [muons] in GeV, direction
-    [muons, 3] and charge [muons], in the latents' precision. ``graph`` builds the same in ONNX.
-    """
-
-    @property
-    def architecture(self) -> str:
-        """Its name."""
-
-    @property
-    def latent_size(self) -> int:
-        """Uniform numbers of a draw."""
-
-    @property
-    def muons_per_draw(self) -> int:
-        """Muons made of them."""
-
-    @property
-    def energy_range(self) -> tuple[float, float]:
-        """Lowest and highest kinetic energy [GeV]."""
-
-    @property
-    def energy_mean(self) -> float:
-        """Mean of the transformed energy in training; for the record."""
-
-    def __call__(self, latent: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Evaluate in PyTorch."""
-
-    def graph(self) -> tuple[Graph, str, str, str]:
-        """Build the graph; returns it with the names of energy, direction and charge."""
-
-
-@dataclass(frozen=True)
-class Training:
-    """What a model was trained on.
-
-    Parameters
-    ----------
-    depth_m, medium, source, provenance, rate, rate_uncertainty, smoothed
-        Of the sample, see `deepmuon_training.sample.Sample`.
-    muons
-        How many.
-    seed
-        Of weights and batches.
-    """
-
-    depth_m: float
-    medium: str
-    source: str
-    provenance: tuple[str, ...]
-    rate: float | None
-    rate_uncertainty: float | None
-    smoothed: bool | None
-    muons: int
-    seed: int
-
-    @classmethod
-    def of(cls, sample: Sample, seed: int) -> Training:
-        """Note what a sample is, without its muons."""
-        alike = {f.name: getattr(sample, f.name) for f in fields(cls) if f.name not in ("muons", "seed")}
-        return cls(**alike, muons=len(sample), seed=seed)
 
 
 @dataclass(frozen=True)
@@ -199,30 +129,5 @@ def _model(generator: Exportable, training: Training) -> onnx.ModelProto:
             "direction": (direction, TensorProto.FLOAT, ["muons", 3]),
             "charge": (charge, TensorProto.INT8, ["muons"]),
         },
-        {METADATA_PREFIX + key: value for key, value in _metadata(generator, training).items()},
+        {METADATA_PREFIX + key: value for key, value in metadata(generator, training).items()},
     )
-
-
-def _metadata(generator: Exportable, training: Training) -> dict[str, str]:
-    """Return the model's metadata; what is unknown is left out."""
-    known = {
-        "contract_version": CONTRACT_VERSION,
-        "architecture": generator.architecture,
-        "depth_m": f"{training.depth_m:g}",
-        "medium": training.medium,
-        "muons_per_draw": generator.muons_per_draw,
-        "latent_size": generator.latent_size,
-        "energy_min_gev": generator.energy_range[0],  # all digits: a muon that the graph clips is within
-        "energy_max_gev": generator.energy_range[1],
-        "created_by": f"deepmuon-training {version('deepmuon-training')}",
-        "licence": LICENCE,
-        "rate_hz_per_m2": None if training.rate is None else f"{training.rate:.6g}",
-        "rate_uncertainty_hz_per_m2": None if training.rate_uncertainty is None else f"{training.rate_uncertainty:.3g}",
-        "boxcox_lambda": LAMBDA,
-        "energy_mean": f"{generator.energy_mean:.9g}",
-        "training_source": training.source,
-        "training_smoothed": None if training.smoothed is None else str(training.smoothed).lower(),
-        "training_muons": training.muons,
-        "training_seed": training.seed,
-    }
-    return {key: str(value) for key, value in known.items() if value is not None}

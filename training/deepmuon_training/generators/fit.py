@@ -4,63 +4,47 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Literal
-
-import numpy as np
+from typing import Any
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.physical import HIGHEST_ENERGY, LOWEST_ENERGY, first_unphysical
-from deepmuon_training.energy_transform import box_cox
-from deepmuon_training.export.onnx_export import Training
+from deepmuon_training.export.metadata import Training
+from deepmuon_training.generators.architecture import Azimuth
 from deepmuon_training.generators.fitted import FittedGenerator
-from deepmuon_training.generators.quantile.fit import QuantileSchedules, fit_quantile
-from deepmuon_training.generators.quantile.maps import QuantileGenerator
-from deepmuon_training.generators.transformer.fit import TransformerSettings, fit_transformer
-from deepmuon_training.generators.transformer.model import ChargeTable, TransformerModel, radius_table, raw_muons
-from deepmuon_training.learning.charge import fit_charge
-from deepmuon_training.learning.uniform_azimuth import check_uniform_azimuth
+from deepmuon_training.generators.registry import architecture
+from deepmuon_training.learning.threads import one_thread
 from deepmuon_training.sample import Sample
 
-__all__ = ["ARCHITECTURES", "FEWEST_MUONS", "Azimuth", "Settings", "check_sample", "fit_generator"]
+__all__ = ["FEWEST_MUONS", "check_sample", "fit_generator"]
 
 FEWEST_MUONS = 3000
 """Muons that a sample must hold: fewer say too little of the tails, and of the angles at any energy."""
 
-Azimuth = Literal["uniform", "learned"]
-Settings = QuantileSchedules | TransformerSettings
 
-ARCHITECTURES: dict[str, type[Settings]] = {"quantile": QuantileSchedules, "transformer": TransformerSettings}
-"""The settings of each architecture's fit, by its name."""
-
-_LEARNED_AZIMUTH = (
-    "The azimuth is learned, given energy and zenith: 16 harmonics of its logarithmic density, in steps of 2.8 degrees."
-)
-
-
+@one_thread()
 def fit_generator(
     sample: Sample,
-    architecture: str,
+    name: str,
     *,
     seed: int,
-    settings: Settings | None = None,
+    settings: Any = None,
     azimuth: Azimuth = "uniform",
     checkpoint_folder: Path | None = None,
     progress: bool = True,
 ) -> FittedGenerator:
     """Fit a generator to a sample, the last twentieth of which (500,000 muons at most) validates.
 
-    The number of threads (``torch.set_num_threads``) belongs to the result: other numbers round otherwise.
-
     Parameters
     ----------
     sample
         Independent muons in no particular order.
-    architecture
-        "quantile" or "transformer".
+    name
+        Of the architecture, one of `deepmuon_training.generators.registry.ARCHITECTURES`.
     seed
         Of weights and batches.
     settings
-        How long to train, `ARCHITECTURES[architecture]`; the default made the released models.
+        How long to train, the `settings` of its `deepmuon_training.generators.architecture.Architecture`; their default
+        made the released models.
     azimuth
         Of a `quantile` generator: "uniform", where that is so, or "learned". A `transformer` always learns it.
     checkpoint_folder
@@ -76,13 +60,12 @@ def fit_generator(
     FailedError
         If the training diverges.
     """
-    if architecture not in ARCHITECTURES:
-        raise RefusedError(f"there is no architecture {architecture}, only {' and '.join(ARCHITECTURES)}")
+    kind = architecture(name)
     check_sample(sample)
-    settings = settings or ARCHITECTURES[architecture]()
-    if isinstance(settings, TransformerSettings):
-        return _fit_transformer(sample, settings, seed, checkpoint_folder, progress)
-    return _fit_quantile(sample, settings, seed, azimuth, checkpoint_folder, progress)
+    settings = settings or kind.settings()
+    fit = kind.fit(sample, settings, seed=seed, azimuth=azimuth, checkpoint_folder=checkpoint_folder, progress=progress)
+    training = Training.of(sample, seed)
+    return FittedGenerator(name, fit.networks, training, asdict(settings), fit.notes, fit.unphysical_before_mapping)
 
 
 def check_sample(sample: Sample) -> None:
@@ -99,66 +82,3 @@ def check_sample(sample: Sample) -> None:
     bad = first_unphysical(sample.muons, LOWEST_ENERGY, HIGHEST_ENERGY)
     if bad is not None:
         raise RefusedError(f"the sample can't be learned: muon number {bad[0]} {bad[1]}")
-
-
-def _fit_quantile(
-    sample: Sample, settings: QuantileSchedules, seed: int, azimuth: Azimuth, folder: Path | None, progress: bool
-) -> FittedGenerator:
-    if azimuth == "uniform":
-        check_uniform_azimuth(sample.muons)
-    networks = fit_quantile(
-        sample.muons,
-        seed=seed,
-        schedules=settings,
-        learn_azimuth=azimuth == "learned",
-        checkpoint_folder=folder,
-        progress=progress,
-    )
-    return FittedGenerator(networks, Training.of(sample, seed), asdict(settings), _quantile_notes(networks), None)
-
-
-def _quantile_notes(networks: QuantileGenerator) -> tuple[str, ...]:
-    tails, clip = networks.tails, networks.condition
-    low, high = (float(energy) for energy in networks.transform.energy(np.array([clip.low, clip.high])))
-    return (
-        f"Above {tails.high:.0f} GeV, where the training sample thins out, the flux above E goes as "
-        f"E^-{tails.high_exponent:.2f}, up to {HIGHEST_ENERGY:.0e} GeV; below {1000 * tails.low:.1f} MeV the flux "
-        f"under E goes as E^{tails.low_exponent:.2f}, down to 1 MeV.",
-        f"Muons above {high:.0f} GeV share one distribution of angles and charges; so do those below {1000 * low:.1f} "
-        "MeV.",
-        *(() if networks.azimuth is None else (_LEARNED_AZIMUTH,)),
-    )
-
-
-def _fit_transformer(
-    sample: Sample, settings: TransformerSettings, seed: int, folder: Path | None, progress: bool
-) -> FittedGenerator:
-    """Fit the paper's network, and add what it lacks: true zenith angles and charges."""
-    muons = sample.muons
-    checkpoint, charge_checkpoint = (folder and folder / name for name in ("transformer.pt", "charge.pt"))
-    network, transform = fit_transformer(muons, seed=seed, settings=settings, checkpoint=checkpoint, progress=progress)
-    charge = fit_charge(
-        muons, transform, seed=seed, schedule=settings.charge, checkpoint=charge_checkpoint, progress=progress
-    )
-    energy_range = LOWEST_ENERGY, float(muons.kinetic_energy.max())
-    model = TransformerModel.stored(
-        network,
-        transform=transform,
-        angle=radius_table(network, muons, seed=seed, generated=settings.calibration),
-        charge=ChargeTable.of(charge, transform),
-        energy_range=energy_range,
-    )
-    raw = raw_muons(model.network, settings.calibration // 2, seed=(seed + 1) % 2**64)
-    energy, radius = box_cox(raw[:, 0] + transform.mean).numpy(), raw[:, 1:].norm(dim=1).numpy()
-    outside = (energy < energy_range[0]) | (energy > energy_range[1])
-    grazing = np.mean((radius < 1) & (radius > np.sqrt(1 - 0.2**2)))
-    truth = np.mean(muons.cos_zenith < 0.2)
-    notes = (
-        f"The {model.muons_per_draw} muons of a draw are a stratified, correlated set.",
-        f"Of the bare network's muons {np.mean(radius >= 1):.2%} have cos2 x + cos2 y > 1, and {grazing:.3%} have cos "
-        f"zenith < 0.2, where the training sample has {truth:.3%}: the graph's table of zenith angles mends both. "
-        f"{np.mean(outside):.4%} have an energy outside of {energy_range[0]:g} to {energy_range[1]:.0f} GeV, to which "
-        "it is clipped.",
-    )
-    unphysical = float(np.mean((radius >= 1) | outside))
-    return FittedGenerator(model, Training.of(sample, seed), asdict(settings), notes, unphysical)

@@ -12,23 +12,15 @@ import torch
 
 from deepmuon_runtime.errors import RefusedError, reason
 from deepmuon_runtime.files.whole import write_whole
-from deepmuon_training.energy_transform import EnergyTransform
-from deepmuon_training.export.onnx_export import Exportable, Mismatch, Training, export
-from deepmuon_training.generators.quantile.azimuth_fit import AzimuthDensity
-from deepmuon_training.generators.quantile.maps import QuantileGenerator
-from deepmuon_training.generators.quantile.tables import table_error, tabulate
-from deepmuon_training.generators.transformer.model import ChargeTable, TransformerModel
-from deepmuon_training.generators.transformer.network import Transformer
-from deepmuon_training.learning.charge import ChargeProbability
-from deepmuon_training.learning.condition import EnergyCondition
-from deepmuon_training.learning.power_law import PowerLawTails
+from deepmuon_training.export.metadata import Training
+from deepmuon_training.export.onnx_export import Mismatch, export
+from deepmuon_training.generators.registry import architecture
+from deepmuon_training.learning.threads import one_thread
 from deepmuon_training.records import from_json, to_json
 
 __all__ = ["Exported", "FittedGenerator", "export_fitted"]
 
 _FORMAT, _FORMAT_VERSION = "deepmuon-generator", 1
-
-Networks = QuantileGenerator | TransformerModel
 
 
 @dataclass(frozen=True)
@@ -37,28 +29,26 @@ class FittedGenerator:
 
     Parameters
     ----------
-    networks : QuantileGenerator or TransformerModel
-        By architecture.
+    architecture : str
+        Its name.
+    networks
+        As that architecture has them.
     training : Training
         The sample and the seed.
     settings : dict
-        Of the fit: the fields of `QuantileSchedules` or `TransformerSettings`.
+        Of the fit, by the names of the fields of the architecture's `settings`.
     notes : tuple of str
         What its users should know.
     unphysical_before_mapping : float or None
         Fraction of the networks' muons that the graph has to mend; None where there can be none.
     """
 
-    networks: Networks
+    architecture: str
+    networks: Any
     training: Training
     settings: dict[str, Any]
     notes: tuple[str, ...]
     unphysical_before_mapping: float | None
-
-    @property
-    def architecture(self) -> str:
-        """Name of the architecture."""
-        return self.networks.architecture
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write everything to one file.
@@ -73,7 +63,7 @@ class FittedGenerator:
             "format": _FORMAT,
             "format_version": _FORMAT_VERSION,
             "architecture": self.architecture,
-            "networks": _PACK[self.architecture](self.networks),
+            "networks": architecture(self.architecture).pack(self.networks),
             "training": to_json(self.training),
             "settings": self.settings,
             "notes": self.notes,
@@ -102,7 +92,8 @@ class FittedGenerator:
         if version != _FORMAT_VERSION:
             raise RefusedError(f"{path} has format version {version}, and this release reads version {_FORMAT_VERSION}")
         return cls(
-            networks=_UNPACK[parts["architecture"]](parts["networks"]),
+            architecture=parts["architecture"],
+            networks=architecture(parts["architecture"]).unpack(parts["networks"]),
             training=from_json(Training, parts["training"]),
             settings=parts["settings"],
             notes=parts["notes"],
@@ -129,6 +120,7 @@ class Exported:
     unphysical_before_mapping: float | None
 
 
+@one_thread()
 def export_fitted(generator: FittedGenerator, path: Path, *, overwrite: bool = False) -> Exported:
     """Write a generator as an ONNX file that keeps the contract.
 
@@ -137,64 +129,10 @@ def export_fitted(generator: FittedGenerator, path: Path, *, overwrite: bool = F
     RefusedError, FailedError
         As `deepmuon_training.export.onnx_export.export`; `FailedError` also if a map is not monotone.
     """
-    exportable, notes = _exportable(generator)
+    exportable, notes = architecture(generator.architecture).exportable(generator.networks, generator.training.seed)
     mismatch = export(exportable, generator.training, path, overwrite=overwrite)
     rounding = (
         f"ONNX Runtime differs from PyTorch in double precision by at most {mismatch.energy:.1e} of the energy and "
         f"{mismatch.direction:.1e} of a direction, on 100,000 muons."
     )
     return Exported(mismatch, (*generator.notes, *notes, rounding), generator.unphysical_before_mapping)
-
-
-def _exportable(generator: FittedGenerator) -> tuple[Exportable, list[str]]:
-    """Return what the file stores, and notes on it."""
-    if isinstance(generator.networks, TransformerModel):
-        return generator.networks, []
-    tables = tabulate(generator.networks)
-    return tables, [str(table_error(generator.networks, tables, seed=generator.training.seed))]
-
-
-def _pack_quantile(networks: QuantileGenerator) -> dict[str, Any]:
-    return {
-        "mean": networks.transform.mean,
-        "tails": to_json(networks.tails),
-        "condition": to_json(networks.condition),
-        "learned_azimuth": networks.azimuth is not None,
-        "weights": networks.state_dict(),
-    }
-
-
-def _unpack_quantile(parts: dict[str, Any]) -> QuantileGenerator:
-    condition, tails = from_json(EnergyCondition, parts["condition"]), from_json(PowerLawTails, parts["tails"])
-    azimuth = AzimuthDensity(condition) if parts["learned_azimuth"] else None
-    networks = QuantileGenerator(EnergyTransform(parts["mean"]), tails, ChargeProbability(condition), azimuth)
-    networks.load_state_dict(parts["weights"])
-    return networks
-
-
-def _pack_transformer(model: TransformerModel) -> dict[str, Any]:
-    return {
-        "d": model.network.d,
-        "weights": model.network.state_dict(),
-        "mean": model.transform.mean,
-        "angle": torch.from_numpy(model.angle),
-        "charge": torch.from_numpy(model.charge.values),
-        "charge_range": model.charge.x_range,
-        "energy_range": model.energy_range,
-    }
-
-
-def _unpack_transformer(parts: dict[str, Any]) -> TransformerModel:
-    network = Transformer(parts["d"])
-    network.load_state_dict(parts["weights"])
-    return TransformerModel(
-        network,
-        transform=EnergyTransform(parts["mean"]),
-        angle=parts["angle"].numpy(),
-        charge=ChargeTable(parts["charge"].numpy(), parts["charge_range"]),
-        energy_range=parts["energy_range"],
-    )
-
-
-_PACK: dict[str, Any] = {"quantile": _pack_quantile, "transformer": _pack_transformer}
-_UNPACK: dict[str, Any] = {"quantile": _unpack_quantile, "transformer": _unpack_transformer}

@@ -16,10 +16,7 @@ from numpy.typing import NDArray
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.files.whole import write_whole
 
-__all__ = ["CHECKPOINTS", "Checkpoint", "fingerprint"]
-
-CHECKPOINTS = ("charge.pt", "azimuth.pt", "zenith.pt", "transformer.pt")
-"""Their names, each of one part of a fit."""
+__all__ = ["Checkpoint", "fingerprint"]
 
 _SECONDS = 30.0
 _DAMAGES = (OSError, RuntimeError, pickle.UnpicklingError, EOFError, LookupError, TypeError, AttributeError)

@@ -11,70 +11,23 @@ seconds to minutes, and starts anew.
 from __future__ import annotations
 
 import math
-import shutil
-import time
-from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
-from statistics import fmean
 
-from deepmuon_runtime import FailedError, RefusedError, read_attributes
+from deepmuon_runtime import RefusedError, read_attributes
 from deepmuon_training.generators.fit import check_sample
-from deepmuon_training.pipeline import steps as layer_steps
+from deepmuon_training.pipeline import layer as layer_steps
 from deepmuon_training.pipeline.folder import run_folder
+from deepmuon_training.pipeline.layer import Layer
 from deepmuon_training.pipeline.settings import PipelineSettings
-from deepmuon_training.pipeline.steps import Layer
+from deepmuon_training.pipeline.step import Step, run_steps
 from deepmuon_training.sample import read_sample
 from deepmuon_training.scores.evaluate import FEWEST_MUONS
 from deepmuon_training.transport.material import check_material, medium
 
-__all__ = ["Pipeline", "Step", "plan"]
-
-
-@dataclass(frozen=True)
-class Step:
-    """One step of a pipeline.
-
-    Parameters
-    ----------
-    kind
-        fit, export, draw, transport or score.
-    what
-        It works on, in words.
-    result
-        The file with which it ends.
-    make
-        Makes that, given a folder for what is saved on the way, and whether to show progress bars.
-    """
-
-    kind: str
-    what: str
-    result: Path
-    make: Callable[[Path, bool], None]
-
-    @property
-    def is_done(self) -> bool:
-        """Whether its result is there."""
-        return self.result.exists()
-
-    def run(self, progress: bool) -> None:
-        """Make the result, unless it is there, and remove what was saved on the way.
-
-        Raises
-        ------
-        FailedError
-            If that fails.
-        """
-        saved = self.result.with_name(f"unfinished-{self.result.name}")
-        if not self.is_done:
-            saved.mkdir(exist_ok=True)
-            try:
-                self.make(saved, progress)
-            except RefusedError as error:  # by then the user's input is not at fault
-                raise FailedError(f"{self.kind} {self.what}: {error}") from error
-        shutil.rmtree(saved, ignore_errors=True)
+__all__ = ["Pipeline", "plan"]
 
 
 @dataclass(frozen=True)
@@ -116,31 +69,7 @@ class Pipeline:
             If a step fails.
         """
         with run_folder(self.folder, self.settings, self.layers[0].sample):
-            for number, step in enumerate(self.steps, 1):
-                say(f"{number:>3}  {'done' if step.is_done else '':4}  {step.result.name:26}  {step.kind} {step.what}")
-            seconds: dict[str, list[float]] = defaultdict(list)
-            for number, step in enumerate(self.steps, 1):
-                was_done, started = step.is_done, time.monotonic()
-                if not was_done:
-                    say(f"{number} of {len(self.steps)}: {step.kind} {step.what}")
-                step.run(progress)
-                if not was_done:
-                    seconds[step.kind].append(time.monotonic() - started)
-                    say(f"{step.result.name} made in {_duration(seconds[step.kind][-1])}{self._left(seconds)}")
-
-    def _left(self, seconds: dict[str, list[float]]) -> str:
-        """Say how long the rest will take, where a step of each kind that is left has been timed."""
-        kinds = [step.kind for step in self.steps if not step.is_done]
-        if not kinds or not seconds.keys() >= set(kinds):
-            return ""
-        return f"; about {_duration(sum(fmean(seconds[kind]) for kind in kinds))} left"
-
-
-def _duration(seconds: float) -> str:
-    minutes, hours = round(seconds / 60), int(seconds / 3600)
-    if seconds < 100:
-        return f"{seconds:.0f} s"
-    return f"{minutes} min" if minutes < 100 else f"{hours} h {minutes - 60 * hours} min"
+            run_steps(self.steps, say, progress)
 
 
 def plan(settings: PipelineSettings, sample: Path, folder: Path, held_out: Sequence[Path] = ()) -> Pipeline:

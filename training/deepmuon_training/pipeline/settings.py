@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.latents.philox import LARGEST_SEED
-from deepmuon_training.generators.fit import ARCHITECTURES, FEWEST_MUONS, Azimuth, Settings
-from deepmuon_training.generators.quantile.fit import QuantileSchedules
-from deepmuon_training.generators.transformer.fit import TransformerSettings
+from deepmuon_training.generators.architecture import Azimuth
+from deepmuon_training.generators.fit import FEWEST_MUONS
+from deepmuon_training.generators.registry import ARCHITECTURES, architecture
 from deepmuon_training.pipeline.settings_file import read_table, settings_from
 from deepmuon_training.scores import evaluate
 
@@ -25,7 +27,7 @@ class PipelineSettings:
     Parameters
     ----------
     architecture
-        "quantile" or "transformer".
+        One of `deepmuon_training.generators.registry.ARCHITECTURES`.
     azimuth
         Of a `quantile` generator, "uniform" or "learned"; see `deepmuon_training.generators.fit.fit_generator`.
     layers
@@ -44,8 +46,8 @@ class PipelineSettings:
         Carry the muons that came through the slab above, instead of those that its generator draws.
     seed
         From which all seeds are derived, by `deepmuon_training.pipeline.seeds.step_seed`.
-    quantile, transformer
-        How generators of this architecture are fitted.
+    fits
+        How the generators of each architecture are fitted; in the file, a table by its name.
 
     Raises
     ------
@@ -64,8 +66,9 @@ class PipelineSettings:
     scored_muons: int = 20_000_000
     direct: bool = False
     seed: int = 1
-    quantile: QuantileSchedules = field(default_factory=QuantileSchedules)
-    transformer: TransformerSettings = field(default_factory=TransformerSettings)
+    fits: Mapping[str, Any] = field(
+        default_factory=lambda: {name: architecture(name).settings() for name in ARCHITECTURES}
+    )
 
     def __post_init__(self) -> None:
         """Refuse what can't be."""
@@ -80,9 +83,9 @@ class PipelineSettings:
             raise RefusedError(f"layer_m is {self.layer_m:g}, and should be above 0")
 
     @property
-    def fit(self) -> Settings:
+    def fit(self) -> Any:
         """How the generators of this pipeline are fitted."""
-        return self.quantile if self.architecture == "quantile" else self.transformer
+        return self.fits[self.architecture]
 
 
 def read_pipeline_settings(path: Path) -> PipelineSettings:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import tomllib
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -42,8 +43,8 @@ def settings_from(defaults: T, table: dict[str, Any], name: str) -> T:
     Parameters
     ----------
     defaults
-        Instance of a dataclass whose fields are bool, int, float, str, one of these or None, a literal, or such
-        dataclasses.
+        Instance of a dataclass whose fields are bool, int, float, str, one of these or None, a literal, such
+        dataclasses, or a mapping of names to them, of which each counts as a field.
     table
         Values by the names of the fields; what is left out stays. A whole number is written as an integer, or as
         in 4e6.
@@ -55,16 +56,31 @@ def settings_from(defaults: T, table: dict[str, Any], name: str) -> T:
     RefusedError
         If a key is unknown, or a value can't be; also by what the ``__post_init__`` of the dataclass refuses.
     """
-    kinds = get_type_hints(type(defaults))
+    hints, known = get_type_hints(type(defaults)), _by_key(defaults)
     for key in table:
-        if key not in kinds:
-            (nearest,) = get_close_matches(key, kinds, n=1, cutoff=0)
+        if key not in known:
+            (nearest,) = get_close_matches(key, known, n=1, cutoff=0)
             raise RefusedError(f"{name}: unknown key {key!r}; the nearest known one is {nearest!r}")
-    values = {key: _value(kinds[key], value, f"{name}: {key}", getattr(defaults, key)) for key, value in table.items()}
+    values: dict[str, Any] = {}
+    for key, value in table.items():
+        field, default = known[key]
+        kind = hints[field] if field == key else type(default)
+        found = _value(kind, value, f"{name}: {key}", default)
+        values[field] = found if field == key else {**values.get(field, getattr(defaults, field)), key: found}
     try:
         return replace(defaults, **values)  # type: ignore[type-var]
     except RefusedError as error:
         raise RefusedError(f"{name}: {error}") from error
+
+
+def _by_key(settings: Any) -> dict[str, tuple[str, Any]]:
+    """Return the keys that settings have in a file, each with its field and value: a mapping's names are keys."""
+    known: dict[str, tuple[str, Any]] = {}
+    for field in fields(settings):
+        value = getattr(settings, field.name)
+        inner = value if isinstance(value, Mapping) else {field.name: value}
+        known |= {key: (field.name, one) for key, one in inner.items()}
+    return known
 
 
 def _value(kind: Any, value: Any, name: str, default: Any) -> Any:
@@ -95,7 +111,7 @@ def to_toml(settings: Any) -> str:
 
 
 def _lines(settings: Any, table: str) -> list[str]:
-    values = {field.name: getattr(settings, field.name) for field in fields(settings)}
+    values = {key: value for key, (_, value) in _by_key(settings).items()}
     inner = {key: value for key, value in values.items() if is_dataclass(value)}
     lines = [f"{key} = {_scalar(value)}" for key, value in values.items() if key not in inner and value is not None]
     for key, value in inner.items():

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from deepmuon_runtime import read_attributes, read_muons
-from deepmuon_training.pipeline.steps import Layer
+from deepmuon_training.pipeline.layer import Layer
 from deepmuon_training.sample import read_sample
 from deepmuon_training.scores.evaluation import Evaluation
 

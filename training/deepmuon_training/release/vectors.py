@@ -16,7 +16,7 @@ import torch
 from numpy.typing import NDArray
 
 from deepmuon_runtime.latents.philox import latents
-from deepmuon_training.export.onnx_export import Exportable
+from deepmuon_training.export.exportable import Exportable
 from deepmuon_training.generators.read_back import read_back
 
 __all__ = ["muon_vectors"]

@@ -8,7 +8,8 @@ import torch
 from scipy.stats import ks_2samp
 
 from deepmuon_runtime import Generator
-from deepmuon_training.export.onnx_export import Training, export
+from deepmuon_training.export.metadata import Training
+from deepmuon_training.export.onnx_export import export
 from deepmuon_training.generators.quantile.fit import QuantileSchedules, fit_quantile
 from deepmuon_training.generators.quantile.regression import RegressionSteps
 from deepmuon_training.learning import charge

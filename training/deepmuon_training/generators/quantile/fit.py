@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from deepmuon_runtime.muons import Muons
-from deepmuon_runtime.physical import LOWEST_ENERGY
+from deepmuon_runtime.physical import HIGHEST_ENERGY, LOWEST_ENERGY
 from deepmuon_training.energy_transform import EnergyTransform
 from deepmuon_training.generators.quantile.azimuth_fit import AZIMUTH_SCHEDULE, fit_azimuth
 from deepmuon_training.generators.quantile.maps import QuantileGenerator
@@ -20,10 +20,7 @@ from deepmuon_training.learning.descent import Schedule
 from deepmuon_training.learning.power_law import PowerLawTails
 from deepmuon_training.learning.validation import split
 
-__all__ = ["HIGHEST_ENERGY", "QuantileSchedules", "fit_quantile"]
-
-HIGHEST_ENERGY = 1e5
-"""Where the power law of the spectrum ends [GeV]."""
+__all__ = ["QuantileSchedules", "fit_quantile"]
 
 
 @dataclass(frozen=True)

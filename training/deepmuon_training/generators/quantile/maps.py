@@ -40,8 +40,6 @@ class QuantileGenerator(nn.Module):
         Its density, or None where it is uniform.
     """
 
-    architecture = "quantile"
-
     def __init__(
         self,
         transform: EnergyTransform,

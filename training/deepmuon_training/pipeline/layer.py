@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import torch
 from tqdm import tqdm
 
 from deepmuon_runtime import Generator, read_attributes
@@ -16,8 +13,8 @@ from deepmuon_training.generators.fit import fit_generator
 from deepmuon_training.generators.fitted import FittedGenerator, export_fitted
 from deepmuon_training.pipeline.seeds import step_seed
 from deepmuon_training.pipeline.settings import PipelineSettings
-from deepmuon_training.sample import Sample, read_sample
-from deepmuon_training.scores.evaluate import evaluate
+from deepmuon_training.sample import read_sample
+from deepmuon_training.scores.model_evaluation import evaluate_model
 from deepmuon_training.transport.slab_file import transport_file
 
 __all__ = ["Layer", "carry", "draw", "export", "fit", "score"]
@@ -62,34 +59,21 @@ class Layer:
 
 def fit(layer: Layer, settings: PipelineSettings, folder: Path, progress: bool) -> None:
     """Fit a generator to the layer's sample, with checkpoints in a folder."""
-    with _one_thread():
-        fitted = fit_generator(
-            read_sample(layer.sample),
-            settings.architecture,
-            seed=layer.seed(settings, "fit"),
-            settings=settings.fit,
-            azimuth=settings.azimuth,
-            checkpoint_folder=folder,
-            progress=progress,
-        )
+    fitted = fit_generator(
+        read_sample(layer.sample),
+        settings.architecture,
+        seed=layer.seed(settings, "fit"),
+        settings=settings.fit,
+        azimuth=settings.azimuth,
+        checkpoint_folder=folder,
+        progress=progress,
+    )
     fitted.save(layer.generator)
 
 
 def export(layer: Layer) -> None:
     """Write the fitted generator as an ONNX file."""
-    with _one_thread():
-        export_fitted(FittedGenerator.load(layer.generator), layer.model)
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Let PyTorch compute in one thread: other numbers of threads round otherwise."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)
+    export_fitted(FittedGenerator.load(layer.generator), layer.model)
 
 
 def draw(layer: Layer, settings: PipelineSettings, progress: bool) -> None:
@@ -125,23 +109,11 @@ def carry(layer: Layer, below: Layer, settings: PipelineSettings, folder: Path, 
 def score(layer: Layer, settings: PipelineSettings) -> None:
     """Compare the layer's model with held-out muons."""
     assert layer.held_out is not None
-    generator, seed = Generator.open(file=layer.model, device="cpu"), layer.seed(settings, "score")
-    held_out, model = read_sample(layer.held_out), generator.model
-    evaluation = evaluate(
-        generator.sample(settings.scored_muons, seed=seed),
-        held_out.muons,
-        seed=seed,
-        muons_per_draw=model.muons_per_draw,
-        generated_rate=_rate(read_sample(layer.sample, 0, 0)),
-        truth_rate=_rate(held_out),
-        energy_range=(model.energy_min_gev, model.energy_max_gev),
+    evaluation = evaluate_model(
+        layer.model,
+        read_sample(layer.held_out),
+        settings.scored_muons,
+        seed=layer.seed(settings, "score"),
         unphysical_before_mapping=FittedGenerator.load(layer.generator).unphysical_before_mapping,
     )
     write_whole(layer.evaluation, evaluation.to_json().encode())
-
-
-def _rate(sample: Sample) -> tuple[float, float] | None:
-    """Return rate and uncertainty, where both are known."""
-    if sample.rate is None or sample.rate_uncertainty is None:
-        return None
-    return sample.rate, sample.rate_uncertainty

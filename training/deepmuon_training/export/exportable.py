@@ -1,0 +1,45 @@
+"""What an ONNX file is written of."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import torch
+
+from deepmuon_training.export.graph import Graph
+
+__all__ = ["Exportable"]
+
+
+class Exportable(Protocol):
+    """A generator as stored numbers: what an ONNX file holds.
+
+    ``__call__`` evaluates them in PyTorch: latents [draws, latent_size] to kinetic energy [muons] in GeV, direction
+    [muons, 3] and charge [muons], in the latents' precision. ``graph`` builds the same in ONNX.
+    """
+
+    @property
+    def architecture(self) -> str:
+        """Its name."""
+
+    @property
+    def latent_size(self) -> int:
+        """Uniform numbers of a draw."""
+
+    @property
+    def muons_per_draw(self) -> int:
+        """Muons made of them."""
+
+    @property
+    def energy_range(self) -> tuple[float, float]:
+        """Lowest and highest kinetic energy [GeV]."""
+
+    @property
+    def energy_mean(self) -> float:
+        """Mean of the transformed energy in training; for the record."""
+
+    def __call__(self, latent: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Evaluate in PyTorch."""
+
+    def graph(self) -> tuple[Graph, str, str, str]:
+        """Build the graph; returns it with the names of energy, direction and charge."""
