@@ -79,8 +79,8 @@ class _Quantile(Architecture[QuantileSchedules, QuantileGenerator]):
         return tables, (str(table_error(networks, tables, seed=seed)),)
 
     def read_back(self, stored: StoredGenerator) -> QuantileTables:
-        energy, zenith, charge = stored.tables()
-        return QuantileTables(energy.ravel(), zenith, charge, stored.energy_range, stored.energy_mean)
+        energy, zenith, charge = (stored.constants[f"{name}/table"] for name in ("energy", "zenith", "charge"))
+        return QuantileTables(energy, zenith, charge, stored.energy_range, stored.energy_mean)
 
 
 def _notes(networks: QuantileGenerator) -> tuple[str, ...]:
