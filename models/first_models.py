@@ -1,12 +1,15 @@
-"""Models of release 0.1.0, whose networks are not kept, in this release's form.
+"""Puts the models of release 0.1.0, whose networks are not kept, into this release's form.
 
-``python -m deepmuon_training.release.first_models OLD.onnx NEW.onnx`` writes one. A `transformer` keeps all its
-numbers, and its nodes get names. Of a `quantile` model the tables lay elsewhere, evenly in the logarithm of the tail
-probability, with a sign: the maps are evaluated, by the interpolation that 0.1.0 used, at the knots of this release.
+    python models/first_models.py FOLDER
+
+The folder holds the ONNX files of release 0.1.0. A `transformer` keeps all its numbers, and its nodes get names. Of a
+`quantile` model the tables lay elsewhere, evenly in the logarithm of the tail probability, with a sign: the maps are
+evaluated, by the interpolation that 0.1.0 used, at the knots of this release.
 """
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -21,12 +24,13 @@ from deepmuon_training.energy_transform import box_cox
 from deepmuon_training.export.exportable import Exportable
 from deepmuon_training.export.graph_steps import bilinear, linear, locate
 from deepmuon_training.export.metadata import Training
-from deepmuon_training.export.onnx_export import Mismatch, export
+from deepmuon_training.export.onnx_export import export
 from deepmuon_training.generators.quantile.cells import COLUMN_REACH, column_logits, energy_logits, row_logits
 from deepmuon_training.generators.quantile.tables import QuantileTables
 from deepmuon_training.generators.read_back import read_numbers
-
-__all__ = ["convert", "from_first"]
+from deepmuon_training.release.card import manifest_entry
+from deepmuon_training.release.vectors import muon_vectors
+from make import RELEASED, VECTORS, write_manifest
 
 _ENERGY_SHAPE, _PLANE_SHAPE = (3841, 1), (81, 129)
 _ENERGY_REACH, _ROW_REACH = 34.0, 10.0
@@ -92,16 +96,29 @@ def _training(known: dict[str, str]) -> Training:
 _UNCERTAINTY = "rate_uncertainty_hz_per_m2"
 
 
-def convert(old: Path, new: Path) -> Mismatch:
-    """Write a file of release 0.1.0 as one of this release.
-
-    Raises
-    ------
-    RefusedError, FailedError
-        As `from_first` and `deepmuon_training.export.onnx_export.export`.
-    """
-    return export(*from_first(old.read_bytes()), new)
+def release(old: Path) -> None:
+    """Put a model of release 0.1.0 where it is released, in this release's form, with its test vectors and card."""
+    generator, training = from_first(old.read_bytes())
+    new = RELEASED / old.name
+    mismatch = export(generator, training, new, overwrite=True)
+    (VECTORS / f"{new.stem}.json").write_text(muon_vectors(new), encoding="utf-8")
+    described = manifest_entry(new)
+    card = new.with_suffix(".md").read_text()
+    for key in ("sha256", "size", "created_by"):
+        card = re.sub(rf"^\| {key} \| .* \|$", f"| {key} | {described[key]} |", card, flags=re.MULTILINE)
+    card = re.sub(
+        r"^- (The tables differ|ONNX Runtime differs|The numbers of release).*\n", "", card, flags=re.MULTILINE
+    )
+    note = (
+        "- The numbers of release 0.1.0 in the form of this one (`python models/first_models.py`): the scores above "
+        f"are those of the file of 0.1.0. ONNX Runtime differs from PyTorch in double precision by at most "
+        f"{mismatch.energy:.1e} of the energy and {mismatch.direction:.1e} of a direction, on 100,000 muons.\n"
+    )
+    new.with_suffix(".md").write_text(card.replace("## Limits\n\n", f"## Limits\n\n{note}"))
+    print(f"{new.name}: {described['size']} bytes, {mismatch}")
 
 
 if __name__ == "__main__":
-    print(convert(*map(Path, sys.argv[1:])))
+    for path in sorted(Path(sys.argv[1]).glob("*.onnx")):
+        release(path)
+    write_manifest()
