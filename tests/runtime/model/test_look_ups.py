@@ -6,6 +6,7 @@ import onnxruntime
 import pytest
 from onnx import TensorProto, helper, numpy_helper
 
+from deepmuon_runtime.model.device import open_session
 from deepmuon_runtime.model.look_ups import with_gather
 
 TABLE = np.arange(300, dtype=np.float32) ** 2
@@ -58,3 +59,21 @@ def test_a_model_without_look_ups_stays_as_it_is_byte_by_byte():
 def test_what_is_no_message_is_an_error():
     with pytest.raises(ValueError, match="cut off"):
         with_gather(model("a")[:-3])
+
+
+def test_cuda_is_given_gather_and_a_processor_gather_elements(monkeypatch):
+    content, given = model("energy/look_up/GatherElements_0"), []
+
+    class Session:
+        def __init__(self, content, options, providers, **others):
+            self._provider = providers[0][0]
+            given.append((self._provider, operators(content)))
+
+        def get_providers(self):
+            return [self._provider]
+
+    monkeypatch.setattr(onnxruntime, "InferenceSession", Session)
+    monkeypatch.setattr(onnxruntime, "get_available_providers", lambda: ["CUDAExecutionProvider"])
+    assert open_session(content, "a model", "cuda")[1] == "cuda"
+    assert open_session(content, "a model", "cpu")[1] == "cpu"
+    assert given == [("CUDAExecutionProvider", ["Gather"]), ("CPUExecutionProvider", ["GatherElements"])]
