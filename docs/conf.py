@@ -28,7 +28,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_click",
 ]
-exclude_patterns = ["_build", "benchmark.md", "engines.md", "experiments", "measured.md"]
+exclude_patterns = ["_build"]
 default_role = "py:obj"  # `name` in a docstring is Python's
 smartquotes = False  # options have two dashes
 
