@@ -9,7 +9,7 @@ from pathlib import Path
 
 from deepmuon_training.transport.geant4_data import without_data_sets
 
-sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
+sys.path[:0] = [str(Path(__file__).parent / "_extensions"), str(Path(__file__).parents[1])]  # the latter for studies
 os.environ.update(without_data_sets())  # for the modules that import geant4_pybind
 
 project = "DeepMuon"
@@ -18,6 +18,7 @@ copyright = f"2026, {author}"
 release = version = version_of("deepmuon-runtime")
 
 extensions = [
+    "floor_plan",
     "include_all",
     "live_page",
     "mathml",
@@ -28,7 +29,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_click",
 ]
-exclude_patterns = ["_build", "benchmark.md", "engines.md", "experiments", "measured.md"]
+exclude_patterns = ["_build"]
 default_role = "py:obj"  # `name` in a docstring is Python's
 smartquotes = False  # options have two dashes
 

@@ -20,9 +20,9 @@ from deepmuon_runtime import Generator, Muons
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_training.commands.train import train
 from deepmuon_training.learning import charge
-from deepmuon_training.mountain import behind_mountain
 from deepmuon_training.sample import Sample, write_sample
 from deepmuon_training.scores import evaluate
+from studies.pictures.mountain import behind_mountain
 
 COMMAND = Path(sysconfig.get_path("scripts")) / "deepmuon-train"
 
