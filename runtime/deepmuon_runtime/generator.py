@@ -55,7 +55,7 @@ class Generator:
     Muon number i of a seed is the same whatever the number of muons, threads and chunks: bit by bit on one
     type of CPU, and to float32 rounding between types of CPU, or CPU and CUDA. So a shorter run is the
     beginning of a longer one. To that end the model always runs on whole blocks of draws that begin at
-    multiples of their size.
+    multiples of their size. Two models have nothing in common at one seed: each has a stream of its own.
 
     Attributes
     ----------
@@ -79,6 +79,7 @@ class Generator:
         self.device = device
         self.threads = threads
         self._session = session
+        self._stream = model.stream
         self._block_draws = _block_draws(model, device)
         self._own = threading.local()  # each thread's memory for its runs
 
@@ -256,7 +257,7 @@ class Generator:
         area
             Square metres.
         seed
-            0 to 2^64 - 1; the number has a stream of its own, apart from the muons of that seed.
+            0 to 2^64 - 1; the number has random numbers of its own, apart from the muons of that seed.
 
         Raises
         ------
@@ -270,7 +271,7 @@ class Generator:
             raise RefusedError(
                 f"{mean:g} muons are expected in {live_time:g} s on {area:g} m2, and should be 0 to 2^53"
             )
-        return poisson(mean, checked_seed(seed))
+        return poisson(mean, checked_seed(seed), self._stream)
 
     def _attributes(self, seed: int, shard: Shard, total: int) -> dict[str, object]:
         model = self.model
@@ -308,7 +309,7 @@ class Generator:
         while done < len(muons):
             block, skipped = divmod(first + done, size)
             part = muons[done : done + size - skipped]
-            fill_latents(run.latent, seed, block * self._block_draws)
+            fill_latents(run.latent, seed, block * self._block_draws, self._stream)
             self._run(run, skipped, part)
             check_physical(part, self.model.energy_min_gev, self.model.energy_max_gev, first + done)
             done += len(part)

@@ -60,6 +60,16 @@ def test_the_main_job_gives_the_muons_of_the_model_and_says_so(gen):
     assert attributes["live_time_s_m2"] == 1000 / 55.5
 
 
+@pytest.mark.usefixtures("released")
+def test_two_depths_of_a_seed_have_nothing_in_common(gen):
+    """The two models have the same graph; the correlation is within 4 standard deviations: 6e-5 false alarms."""
+    n = 20_000
+    for depth in (0, 10):
+        assert gen("--depth", depth, "-n", n, "--seed", 1, "-o", f"{depth}.h5")[0] == 0
+    energies = [np.log(read_muons(f"{depth}.h5").kinetic_energy) for depth in (0, 10)]
+    assert abs(np.corrcoef(energies)[0, 1]) < 4 / np.sqrt(n)
+
+
 def test_a_model_of_ones_own_is_taken_from_its_file(gen, model_file):
     assert gen("--model", model_file, "-n", 10, "-o", "muons.h5")[0] == 0
     assert len(read_muons("muons.h5")) == 10

@@ -53,7 +53,7 @@ def test_a_muon_is_made_of_its_own_latents(generator, many):
     """The graph is simple enough to be done again in numpy."""
     size = 4 * generator.model.muons_per_draw
     draws = -(-len(many) // generator.model.muons_per_draw)
-    l0, l1, l2, l3 = latents(5, 0, draws, size).reshape(-1, 4)[: len(many)].T.astype(float)
+    l0, l1, l2, l3 = latents(5, 0, draws, size, generator.model.stream).reshape(-1, 4)[: len(many)].T.astype(float)
     cosine, azimuth = 0.55 + 0.4 * l1, np.pi * l2
     np.testing.assert_allclose(many.kinetic_energy, np.exp(3 * l0), rtol=1e-5)
     np.testing.assert_allclose(many.cos_zenith, cosine, rtol=1e-5)
@@ -83,7 +83,7 @@ def test_muons_far_away_are_made_of_their_own_latents(generator, first):
     per_draw = generator.model.muons_per_draw
     draw, skipped = divmod(first, per_draw)
     draws = -(-(skipped + 1000) // per_draw)
-    l0 = latents(5, draw, draws, 4 * per_draw).reshape(-1, 4)[skipped : skipped + 1000, 0]
+    l0 = latents(5, draw, draws, 4 * per_draw, generator.model.stream).reshape(-1, 4)[skipped : skipped + 1000, 0]
     np.testing.assert_allclose(generator.sample(1000, seed=5, first=first).kinetic_energy, np.exp(3 * l0), rtol=1e-5)
 
 
@@ -146,10 +146,45 @@ def test_other_seeds_give_other_muons(generator):
 def test_a_draw_may_be_larger_than_a_block(tmp_path):
     """Blocks are then of one draw, which begins anywhere among the words of the stream."""
     generator = opened(tmp_path, tiny_model(20_001))
-    l0 = latents(5, 0, 8, 4 * 20_001).reshape(-1, 4)[:, 0].astype(float)
+    l0 = latents(5, 0, 8, 4 * 20_001, generator.model.stream).reshape(-1, 4)[:, 0].astype(float)
     many = generator.sample(8 * 20_001, seed=5)
     np.testing.assert_allclose(many.kinetic_energy, np.exp(3 * l0), rtol=1e-5)
     assert are_equal(generator.sample(30_000, seed=5, first=50_000), many[50_000:80_000])
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"depth_m": "10.5"},
+        {"medium": "rock"},
+        {"flux": "measured"},
+        {"architecture": "another"},
+        {"created_by": "another program 1.0"},
+    ],
+    ids=lambda changes: next(iter(changes)),
+)
+def test_another_model_gives_other_muons_of_a_seed(tmp_path, changes):
+    """The two have the same graph; the correlation is within 4 standard deviations: 6e-5 false alarms for each."""
+    n = 100_000
+    one, other = (
+        np.log(opened(tmp_path, tiny_model(metadata=metadata)).sample(n, seed=1).kinetic_energy)
+        for metadata in ({}, changes)
+    )
+    assert abs(np.corrcoef(one, other)[0, 1]) < 4 / np.sqrt(n)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ({"created_by": "the tests 1.0"}, {"created_by": "the tests 2.0"}),
+        ({"created_by": "tests", "flux": "cry"}, {"created_by": "another", "flux": "cry"}),
+        ({"depth_m": "10"}, {"depth_m": "1e1"}),
+        ({"rate_hz_per_m2": "1"}, {"rate_hz_per_m2": "2"}),
+    ],
+)
+def test_what_is_no_part_of_a_models_stream_changes_nothing(tmp_path, one, other):
+    a, b = (opened(tmp_path, tiny_model(metadata=metadata)).sample(100, seed=1) for metadata in (one, other))
+    assert are_equal(a, b)
 
 
 def test_without_a_seed_no_two_samples_are_equal(generator):
@@ -261,7 +296,7 @@ def test_more_muons_than_the_disk_holds_are_refused_with_both_sizes(model_file, 
 
 def test_a_bad_muon_is_a_failure_that_names_it_and_leaves_no_file(tmp_path):
     generator = opened(tmp_path, tiny_model(edits=RARELY_BAD))
-    number = int(np.argmax(np.abs(latents(3, 0, 1_000_000, 4)[:, 0] - np.float32(0.3)) < 1e-5))
+    number = int(np.argmax(np.abs(latents(3, 0, 1_000_000, 4, generator.model.stream)[:, 0] - np.float32(0.3)) < 1e-5))
     assert number > 1000
     assert len(generator.sample(number, seed=3)) == number  # a bad one beyond the end does not matter
     for fails in (generator.sample, lambda n, seed: generator.write(tmp_path / "muons.h5", n, seed)):
