@@ -10,6 +10,7 @@ from typing import NoReturn
 import click
 
 from deepmuon_cli.process.isolation import run_isolated, show_life
+from deepmuon_cli.process.stdout import told_faults
 
 __all__ = ["csv", "main"]
 
@@ -63,17 +64,12 @@ def main() -> NoReturn:
 
 def _print(pieces: Iterator[bytes]) -> None:
     """Write to stdout, unbuffered: nothing is left to be written when its reader has gone."""
-    from deepmuon_runtime.errors import FailedError, reason
-
-    try:
-        with open(sys.stdout.fileno(), "wb", buffering=0, closefd=False) as stdout:
-            for piece in pieces:
-                left = memoryview(piece)
-                while left:
-                    left = left[stdout.write(left) :]
-                show_life()
-    except OSError as error:
-        raise FailedError(f"stdout was not written to its end: {reason(error)}") from error
+    with told_faults(), open(sys.stdout.fileno(), "wb", buffering=0, closefd=False) as stdout:
+        for piece in pieces:
+            left = memoryview(piece)
+            while left:
+                left = left[stdout.write(left) :]
+            show_life()
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from itertools import chain, pairwise
+from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -118,8 +119,8 @@ class Generator:
         from deepmuon_runtime.model.onnx_file import check_onnx_file
 
         threads = _usable_processors() if threads is None else threads
-        if threads < 1:
-            raise RefusedError(f"{threads} threads can't make muons: 1 or more can")
+        if not isinstance(threads, Integral) or threads < 1:
+            raise RefusedError(f"{threads!r} threads can't make muons: 1 or more can")
         if file is None:
             if depth is None:
                 raise RefusedError("which model? Give the depth of a released one, or the file of another")
@@ -266,6 +267,9 @@ class Generator:
         """
         if self.model.rate_hz_per_m2 is None:
             raise RefusedError(f"{self.model.name} does not know its rate: give a number of muons")
+        for number, meaning in ((live_time, "live time in seconds"), (area, "area in m2")):
+            if not isinstance(number, Real):
+                raise RefusedError(f"{number!r} is no {meaning}: a number is")
         mean = self.model.rate_hz_per_m2 * live_time * area
         if not 0 < mean <= LARGEST_NUMBER:
             raise RefusedError(
@@ -395,8 +399,8 @@ def _usable_processors() -> int:
 def checked_numbers(n: float, first: float = 0) -> range:
     """Return the numbers of n muons from `first` on, or raise RefusedError where there are none."""
     for number, meaning in ((n, "number of muons"), (first, "number of a first muon")):
-        if not (0 <= number <= LARGEST_NUMBER and number == int(number)):
-            raise RefusedError(f"{number} is no {meaning}: a whole number from 0 to 2^53 is")
+        if not isinstance(number, Real) or not 0 <= number <= LARGEST_NUMBER or number % 1 != 0:
+            raise RefusedError(f"{number!r} is no {meaning}: a whole number from 0 to 2^53 is")
     if first + n > LARGEST_NUMBER:
         raise RefusedError(f"{n} muons from number {first} on end after number 2^53")
     return range(int(first), int(first) + int(n))

@@ -260,7 +260,7 @@ def test_progress_counts_every_muon_once(model_file, tmp_path):
     assert len(steps) > 1
 
 
-@pytest.mark.parametrize("n", [-1, 1.5, 2**53 + 1, float("nan"), float("inf")])
+@pytest.mark.parametrize("n", [-1, 1.5, 2**53 + 1, float("nan"), float("inf"), "10", None, [10]])
 def test_a_number_that_is_none_is_refused(model_file, tmp_path, n):
     generator = Generator.open(file=model_file)
     for refused in (generator.sample, generator.chunks, lambda n: generator.write(tmp_path / "m.h5", n)):
@@ -269,7 +269,7 @@ def test_a_number_that_is_none_is_refused(model_file, tmp_path, n):
     assert not (tmp_path / "m.h5").exists()
 
 
-@pytest.mark.parametrize(("n", "first"), [(1, -1), (1, 0.5), (1, 2**53), (2**53, 1), (0, float("nan"))])
+@pytest.mark.parametrize(("n", "first"), [(1, -1), (1, 0.5), (1, 2**53), (2**53, 1), (0, float("nan")), (1, "0")])
 def test_muons_beyond_the_numbers_there_are_are_refused(model_file, n, first):
     generator = Generator.open(file=model_file)
     for refused in (generator.sample, generator.chunks):
@@ -277,7 +277,7 @@ def test_muons_beyond_the_numbers_there_are_are_refused(model_file, n, first):
             refused(n, first=first)
 
 
-@pytest.mark.parametrize("seed", [-1, 2**64])
+@pytest.mark.parametrize("seed", [-1, 2**64, 1.5, "1", float("nan"), float("inf")])
 def test_a_seed_that_is_none_is_refused(model_file, seed):
     with pytest.raises(RefusedError, match="the seed"):
         Generator.open(file=model_file).sample(1, seed)
@@ -326,7 +326,7 @@ def test_a_live_time_that_is_none_is_refused(model_file, live_time):
         Generator.open(file=model_file).number_in_live_time(live_time, 1.0, seed=1)
 
 
-@pytest.mark.parametrize("threads", [0, -1])
+@pytest.mark.parametrize("threads", [0, -1, 1.5, "2"])
 def test_no_threads_are_refused(model_file, threads):
     with pytest.raises(RefusedError, match="threads can't make muons"):
         Generator.open(file=model_file, threads=threads)
@@ -337,6 +337,25 @@ def test_a_model_is_named_by_depth_or_by_file_and_not_by_both(model_file):
         Generator.open()
     with pytest.raises(RefusedError, match="give the file alone"):
         Generator.open(10, file=model_file)
+
+
+@pytest.mark.parametrize(("live_time", "area"), [("10", 1.0), (10.0, "1"), (None, 1.0)])
+def test_a_live_time_or_an_area_that_is_no_number_is_refused(model_file, live_time, area):
+    with pytest.raises(RefusedError, match=r"is no (live time|area)"):
+        Generator.open(file=model_file).number_in_live_time(live_time, area, seed=1)
+
+
+@pytest.mark.usefixtures("released")
+@pytest.mark.parametrize("depth", ["10", [10], 10j])
+def test_a_depth_that_is_no_number_is_refused(depth):
+    with pytest.raises(RefusedError, match="is no number: give metres, such as depth=10"):
+        Generator.open(depth=depth)
+
+
+@pytest.mark.usefixtures("released")
+@pytest.mark.parametrize("number", [np.float32(10), np.int64(10)], ids=repr)
+def test_numpys_numbers_are_numbers(number):
+    assert len(Generator.open(depth=number).sample(number, seed=number)) == 10
 
 
 @pytest.mark.usefixtures("released")

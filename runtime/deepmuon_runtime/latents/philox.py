@@ -10,6 +10,7 @@ change, unlike the methods of its Generator.
 from __future__ import annotations
 
 import secrets
+from numbers import Real
 
 import numpy as np
 from numpy.random import Philox
@@ -48,8 +49,10 @@ def new_seed() -> int:
     return secrets.randbits(63)
 
 
-def checked_seed(seed: int) -> int:
-    """Return the seed if it is one, from 0 to 2^64 - 1, else raise RefusedError."""
+def checked_seed(seed: float) -> int:
+    """Return the seed if it is one, a whole number from 0 to 2^64 - 1, else raise RefusedError."""
+    if not isinstance(seed, Real) or seed % 1 != 0:
+        raise RefusedError(f"the seed {seed!r} is no whole number")
     if not 0 <= seed <= LARGEST_SEED:
         raise RefusedError(f"the seed {seed} is not from 0 to 2^64 - 1 ({LARGEST_SEED})")
     return int(seed)
