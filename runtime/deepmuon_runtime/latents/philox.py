@@ -21,6 +21,7 @@ from deepmuon_runtime.errors import RefusedError
 __all__ = [
     "FOR_COUNT",
     "FOR_LATENTS",
+    "FOR_POSITIONS",
     "LARGEST_SEED",
     "checked_seed",
     "fill_latents",
@@ -34,6 +35,9 @@ FOR_LATENTS = 0
 
 FOR_COUNT = 1
 """The purpose of the words that decide how many muons a live time gives."""
+
+FOR_POSITIONS = 2
+"""The purpose of the words that put muons on a plane."""
 
 LARGEST_SEED = 2**64 - 1
 
@@ -66,7 +70,7 @@ def words(seed: int, stream: int, purpose: int, first: int, count: int) -> NDArr
     seed, stream
         0 to 2^64 - 1.
     purpose
-        `FOR_LATENTS` or `FOR_COUNT`.
+        `FOR_LATENTS`, `FOR_COUNT` or `FOR_POSITIONS`.
     first, count
         Which words.
 
