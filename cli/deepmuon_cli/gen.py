@@ -31,6 +31,7 @@ __all__ = ["gen", "main"]
 
 NAME = "deepmuon-gen"
 FILE = click.Path(path_type=Path)
+BETWEEN_LINES = 30.0  # s, of progress in a log
 
 CUTS = "every muon of the model is written: keep those you want when you read the file"
 MEDIA = "the released models are under water; deepmuon-train transport takes their muons through other materials"
@@ -247,12 +248,31 @@ def _print_models() -> None:
 
 @contextmanager
 def _progress(number: int, hidden: bool) -> Iterator[Callable[[int], object] | None]:
-    """Show a bar on stderr, if that is a terminal."""
-    if hidden or not sys.stderr.isatty():
+    """Show a bar on stderr; where that is no terminal, a line every half minute."""
+    if hidden:
         yield None
+        return
+    if not sys.stderr.isatty():
+        yield _Lines(number).update
         return
     with click.progressbar(length=number, file=sys.stderr, update_min_steps=max(1, number // 200)) as bar:
         yield bar.update
+
+
+class _Lines:
+    """Tells a log how many muons there are, every half minute."""
+
+    def __init__(self, number: int) -> None:
+        self._number = number
+        self._done = 0
+        self._told = time.monotonic()
+
+    def update(self, muons: int) -> None:
+        """Count so many muons more."""
+        self._done += muons
+        if time.monotonic() - self._told >= BETWEEN_LINES:
+            self._told += BETWEEN_LINES
+            click.echo(f"{NAME}: {self._done:,} of {self._number:,} muons", err=True)
 
 
 def _closing_line(output: Path, number: int, seconds: float, generator: Generator, seed: int) -> str:

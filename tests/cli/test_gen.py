@@ -344,6 +344,17 @@ def test_a_bar_shows_the_progress_on_a_terminal(model_file, tmp_path):
     os.close(terminal)
 
 
+def test_a_log_gets_a_line_of_progress_every_half_minute(gen, model_file, monkeypatch):
+    """A clock on which each look is 10 s after the one before."""
+    ticks = iter(range(0, 10**6, 10))
+    monkeypatch.setattr("deepmuon_cli.gen.time.monotonic", lambda: next(ticks))
+    code, _, err = gen("--model", model_file, "-n", "1.2e6", "-o", "muons.h5", "--seed", 1)
+    assert code == 0
+    lines = err.splitlines()
+    assert len(lines) == 3  # of ten pieces
+    assert all(re.fullmatch(r"deepmuon-gen: [\d,]+ of 1,200,000 muons", line) for line in lines)
+
+
 def test_a_warning_is_one_line(gen, model_file, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     for package in ("onnxruntime", "onnxruntime_gpu"):
