@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import io
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -221,9 +223,12 @@ def test_the_learning_rate_rises_over_a_hundredth_of_the_steps_and_falls_along_a
     assert schedule.rate_at(999) == pytest.approx(0, abs=1e-5)
 
 
-def test_progress_shows_steps_loss_distance_and_time_left(capfd: pytest.CaptureFixture[str]):
+def test_progress_shows_steps_loss_distance_and_time_left(monkeypatch: pytest.MonkeyPatch):
+    terminal = io.StringIO()
+    terminal.isatty = lambda: True
+    monkeypatch.setattr(sys, "stderr", terminal)
     fit(network(), loss, distance, SCHEDULE, seed=1, name="energy", progress=True)
-    shown = capfd.readouterr().err
+    shown = terminal.getvalue()
     for part in ("energy:", "60/60", "loss=", "distance=", "<00:00"):
         assert part in shown
 

@@ -61,10 +61,9 @@ def command(
     for path in filter(None, (output, json_output)):
         check_output(path, overwrite)
 
-    from tqdm import tqdm
-
     from deepmuon_runtime import Generator
     from deepmuon_runtime.files.whole import write_whole
+    from deepmuon_training.progress import progress_bar
     from deepmuon_training.reports.report import html_report
     from deepmuon_training.sample import read_sample
     from deepmuon_training.scores.evaluate import FEWEST_MUONS
@@ -73,13 +72,12 @@ def command(
 
     facts, truth = Generator.open(file=model, device="cpu").model, read_sample(held_out)
     number = number or max(FEWEST_MUONS, min(MOST_MUONS, TIMES_HELD_OUT * len(truth)))
-    hidden = quiet or not sys.stderr.isatty()
-    with tqdm(total=number, desc="drawing", unit="muon", unit_scale=True, disable=hidden) as bar:
+    with progress_bar(number, "drawing", " muons", hidden=quiet) as bar:
 
         def drawn(muons: int) -> None:
             bar.update(muons)
             if bar.n == number:
-                bar.set_description("drawn, scoring takes a minute or two")
+                bar.set_description("drawn, scoring takes a minute or two", refresh=sys.stderr.isatty())
 
         evaluation = evaluate_model(model, truth, number, seed=seed, progress=drawn)
     write_whole(output, html_report(evaluation, facts, truth, str(held_out)).encode(), overwrite=overwrite)

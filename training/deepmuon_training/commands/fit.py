@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import click
@@ -111,7 +110,7 @@ def command(
             settings=chosen,
             azimuth="learned" if azimuth == "learned" else "uniform",
             checkpoint_folder=folder,
-            progress=not quiet and sys.stderr.isatty(),
+            progress=not quiet,
         )
         generator.save(output, overwrite=overwrite)
         for name in kind.checkpoints:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -87,7 +86,7 @@ def command(
         material=material,
         density=density,
         box=box,
-        progress=not quiet and sys.stderr.isatty(),
+        progress=not quiet,
     )
     write_sample(output, carried.sample, overwrite=overwrite)
     if not quiet:

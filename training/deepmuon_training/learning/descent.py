@@ -11,10 +11,10 @@ from pathlib import Path
 import torch
 from torch import nn
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
-from tqdm import tqdm
 
 from deepmuon_runtime.errors import FailedError
 from deepmuon_training.learning.checkpoint import Checkpoint
+from deepmuon_training.progress import progress_bar
 
 __all__ = ["Schedule", "fit"]
 
@@ -104,14 +104,16 @@ def fit(
     weights = sum(parameter.numel() for parameter in network.parameters())
     kept = Checkpoint(checkpoint, data=data, seed=seed, schedule=asdict(schedule), **{"number of weights": weights})
     state.load(kept)
-    bar = tqdm(total=schedule.steps, initial=state.step, desc=name, disable=not progress, unit="step", mininterval=1)
+    bar = progress_bar(schedule.steps, name, " steps", hidden=not progress, initial=state.step)
     with bar:
         while state.step < schedule.steps and state.misses < schedule.patience:
             value = state.advance(loss)
             bar.update()
             if state.step % schedule.validate_every == 0 or state.step == schedule.steps:
                 state.look(distance)
-                bar.set_postfix(loss=f"{value:.4g}", distance=f"{state.last:.4g}", best=f"{state.best:.4g}")
+                bar.set_postfix(
+                    loss=f"{value:.4g}", distance=f"{state.last:.4g}", best=f"{state.best:.4g}", refresh=False
+                )
                 state.save(kept)
             elif kept.is_due:
                 state.save(kept)

@@ -6,11 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from numpy.random import SeedSequence
-from tqdm import tqdm
 
 from deepmuon_runtime.errors import FailedError
 from deepmuon_runtime.muon_file.reader import read_attributes, read_muons
 from deepmuon_runtime.muon_file.writer import MuonWriter
+from deepmuon_training.progress import progress_bar
 from deepmuon_training.sample import read_sample, write_sample
 from deepmuon_training.transport.material import medium
 from deepmuon_training.transport.slab import below_slab, transport
@@ -63,7 +63,7 @@ def transport_file(
     overburden = medium(material, density)
     started = int(read_attributes(source)["count"])
     parts = []
-    with tqdm(total=started, desc=target.stem, unit=" muons", unit_scale=True, disable=not progress) as bar:
+    with progress_bar(started, target.stem, " muons", hidden=not progress) as bar:
         for index, first in enumerate(range(0, started, muons_per_part)):
             number = min(muons_per_part, started - first)
             parts.append(folder / f"part-{index:05d}.h5")
