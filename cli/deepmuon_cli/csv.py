@@ -25,11 +25,11 @@ FILE = click.Path(path_type=Path, allow_dash=True)
     "-o", "--output", type=FILE, metavar="FILE", required=True, help="The CSV file to be written; - is stdout."
 )
 @click.option("--units", type=click.Choice(("GeV", "MeV")), default="GeV", help="Unit of the energy; GeV if left out.")
-@click.option("--no-header", is_flag=True, help="No first line with the names of the columns.")
 @click.option(
     "--phits", "side", type=metres, metavar="SIDE", help="A list for PHITS instead, on a square of so many metres."
 )
 @click.option("--seed", type=seed_number, metavar="SEED", help="Of the places for --phits; a new one if left out.")
+@click.option("--no-header", is_flag=True, help="No comments, and no line with the names of the columns.")
 @click.option("--overwrite", is_flag=True, help="Replace an existing file, once the new one is complete.")
 @click.version_option(package_name="deepmuon-runtime", prog_name=NAME, message="%(prog)s %(version)s")
 def csv(
@@ -40,13 +40,16 @@ def csv(
     \b
         $ deepmuon-gen --depth 10 -n 1000 -q -o muons.h5
         $ deepmuon-csv muons.h5 --units MeV -o muons.csv
-        $ head -n 1 muons.csv
+        $ grep depth_m muons.csv
+        # depth_m = 10.0
+        $ grep -v '#' muons.csv | head -n 1
         kinetic_energy_MeV,u,v,w,pdg_id
-        $ wc -l < muons.csv
+        $ grep -v '#' muons.csv | wc -l
         1001
 
     Columns: kinetic energy in GeV or MeV; direction of motion u, v, w, a unit vector, z up; pdg_id, 13 for mu- and -13
-    for mu+. Nine digits keep every number as it is in the file.
+    for mu+. Nine digits keep every number as it is in the file. What the file says of its muons stands above them in
+    lines that begin with #.
 
     For PHITS (s-type = 17) a line holds particle, x, y, z in cm, u, v, w, energy in MeV, weight, and time:
 
@@ -54,6 +57,7 @@ def csv(
         deepmuon-csv muons.h5 --phits 10 --seed 1 -o muons.phits
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime.errors import RefusedError
+    from deepmuon_runtime.files.output import check_output
     from deepmuon_runtime.files.whole import whole_file
     from deepmuon_runtime.latents.philox import new_seed
     from deepmuon_runtime.views.text import csv_pieces, phits_pieces
@@ -68,8 +72,7 @@ def csv(
     if str(output) == "-":
         _print(pieces)
         return
-    if output.exists() and file.exists() and output.samefile(file):
-        raise RefusedError(f"{output} is the muon file itself, which the text would replace: give another name")
+    check_output(output, overwrite, [file])
     with whole_file(output, overwrite=overwrite) as text:
         for piece in pieces:
             text.write(piece)

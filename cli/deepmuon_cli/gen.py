@@ -184,7 +184,7 @@ def gen(
     from deepmuon_runtime.files.output import check_output
     from deepmuon_runtime.latents.shard import WHOLE_RUN
 
-    check_output(output, overwrite)
+    check_output(output, overwrite, [] if model is None else [model])
     generator = Generator.open(depth, architecture, file=model, device=device, threads=threads)
     seed = new_seed() if seed is None else seed
     attributes = {}

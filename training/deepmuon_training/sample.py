@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from deepmuon_runtime.muons import Muons
 __all__ = [
     "Sample",
     "read_sample",
+    "sample_of",
     "write_sample",
 ]
 
@@ -86,14 +88,18 @@ def read_sample(path: str | Path, first: int = 0, count: int | None = None) -> S
     RefusedError
         If the file is no such file, or does not hold the muons asked for.
     """
-    attributes = read_attributes(path)
+    return sample_of(read_muons(path, first, count), read_attributes(path))
+
+
+def sample_of(muons: Muons, attributes: Mapping[str, Any]) -> Sample:
+    """Return muons with what the attributes of a muon file say of them."""
     rate = attributes.get("rate_hz_per_m2")
     uncertainty = attributes.get("rate_uncertainty_hz_per_m2")
     smoothed = attributes.get("smoothed")
     return Sample(
-        muons=read_muons(path, first, count),
+        muons=muons,
         depth_m=float(attributes["depth_m"]),
-        source=str(attributes.get("source", attributes["created_by"])),
+        source=str(attributes.get("source") or attributes["created_by"]),
         provenance=tuple(str(line) for line in attributes.get("provenance", ())),
         medium=str(attributes["medium"]),
         rate=None if rate is None else float(rate),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
@@ -10,7 +11,8 @@ import numpy as np
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.latents.philox import FOR_POSITIONS, words
-from deepmuon_runtime.muon_file.reader import read_pieces
+from deepmuon_runtime.muon_file.format import FORMAT
+from deepmuon_runtime.muon_file.reader import read_attributes, read_pieces
 from deepmuon_runtime.muons import Muons
 
 __all__ = ["UNITS", "csv_pieces", "phits_pieces"]
@@ -27,6 +29,7 @@ def csv_pieces(path: str | Path, *, unit: str = "GeV", header: bool = True) -> I
     """Read a muon file as comma-separated text, in pieces of whole lines.
 
     A line holds kinetic energy, u, v, w and pdg_id; read as float32 numbers, and in GeV, they are those of the file.
+    What the file says of its muons stands above them as comments: # name = value, the value in JSON.
 
     Parameters
     ----------
@@ -35,7 +38,7 @@ def csv_pieces(path: str | Path, *, unit: str = "GeV", header: bool = True) -> I
     unit
         Unit of the energy, one of `UNITS`.
     header
-        Whether the first line names the columns: kinetic_energy_GeV,u,v,w,pdg_id.
+        Whether comments come first, and a line that names the columns: kinetic_energy_GeV,u,v,w,pdg_id.
 
     Raises
     ------
@@ -47,6 +50,8 @@ def csv_pieces(path: str | Path, *, unit: str = "GeV", header: bool = True) -> I
     pieces = read_pieces(path, PIECE)
     first = next(pieces, Muons.empty(0))
     if header:
+        said = {"format": FORMAT, **read_attributes(path)}
+        yield "".join(f"# {name} = {json.dumps(value)}\n" for name, value in said.items())
         yield f"kinetic_energy_{unit},u,v,w,pdg_id\n"
     for muons in chain([first], pieces):
         yield _lines(muons, UNITS[unit])

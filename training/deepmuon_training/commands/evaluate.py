@@ -59,7 +59,7 @@ def command(
     if output == json_output:
         raise click.UsageError("--json needs a file of its own, other than --output")
     for path in filter(None, (output, json_output)):
-        check_output(path, overwrite)
+        check_output(path, overwrite, [model, held_out])
 
     from deepmuon_runtime import Generator
     from deepmuon_runtime.files.whole import write_whole

@@ -84,7 +84,7 @@ def command(
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime.files.output import check_output
 
-    check_output(output, overwrite)
+    check_output(output, overwrite, [muons, *filter(None, [settings])])
     if width is not None and architecture_name != "transformer":
         raise click.UsageError("-d goes with --architecture transformer: a quantile generator has no width")
     if azimuth is not None and architecture_name != "quantile":

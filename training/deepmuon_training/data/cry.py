@@ -11,7 +11,9 @@ from deepmuon_runtime.errors import RefusedError, reason
 from deepmuon_runtime.muon_file.damage import READ_ERRORS
 from deepmuon_runtime.muons import Muons
 from deepmuon_runtime.physical import LOWEST_ENERGY
-from deepmuon_training.data.foreign_muons import numbered, pdg_id_of, refuse_unphysical
+from deepmuon_training.data.conversion import warn_of_dropped
+from deepmuon_training.data.foreign.muons import pdg_id_of, refuse_unphysical
+from deepmuon_training.data.foreign.table import numbered
 from deepmuon_training.sample import Sample
 
 __all__ = ["CRY_SHOWER_VARIANCE", "HELD_OUT_CRY_MUONS", "read_cry"]
@@ -75,6 +77,7 @@ def read_cry(path: str | Path, part: slice = slice(None)) -> Sample:
     kept = muons.kinetic_energy >= LOWEST_ENERGY
     if not kept.any():
         raise RefusedError(f"{path} has no muon of at least 1 MeV in its rows {rows.start} to {rows.stop}")
+    warn_of_dropped(int(np.sum(~kept)), len(kept), "MeV")
     return Sample(
         muons=muons[kept],
         depth_m=0.0,

@@ -7,13 +7,12 @@ from pathlib import Path
 
 from numpy.random import SeedSequence
 
-from deepmuon_runtime.errors import FailedError
 from deepmuon_runtime.muon_file.reader import read_attributes, read_muons
 from deepmuon_runtime.muon_file.writer import MuonWriter
 from deepmuon_training.progress import progress_bar
 from deepmuon_training.sample import read_sample, write_sample
 from deepmuon_training.transport.material import medium
-from deepmuon_training.transport.slab import below_slab, transport
+from deepmuon_training.transport.slab import below_slab, refuse_none, transport
 
 __all__ = ["transport_file"]
 
@@ -79,10 +78,7 @@ def transport_file(
                 write_sample(parts[-1], carried.sample)
             bar.update(number)
     survived = sum(int(read_attributes(part)["count"]) for part in parts)
-    if survived == 0:
-        raise FailedError(
-            f"none of {started} muons survived {thickness:g} m of {overburden}: carry more, or take a thinner slab"
-        )
+    refuse_none(survived, started, thickness, overburden)
     how = f"seed {seed}, in parts of {muons_per_part}"
     lower = below_slab(upper, started, survived, thickness, overburden, how)
     with MuonWriter(target, lower.attributes) as writer:
