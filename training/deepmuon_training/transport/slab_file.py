@@ -8,7 +8,8 @@ from pathlib import Path
 from numpy.random import SeedSequence
 from tqdm import tqdm
 
-from deepmuon_runtime.errors import FailedError
+from deepmuon_runtime.errors import FailedError, RefusedError
+from deepmuon_runtime.muon_file.check import check_file
 from deepmuon_runtime.muon_file.reader import read_attributes, read_muons
 from deepmuon_runtime.muon_file.writer import MuonWriter
 from deepmuon_training.sample import read_sample, write_sample
@@ -77,6 +78,8 @@ def transport_file(
                     progress=False,
                 )
                 write_sample(parts[-1], carried.sample)
+            elif read_attributes(parts[-1])["count"] and check_file(parts[-1]).defects:
+                raise RefusedError(f"{parts[-1]} is damaged: remove it, and it is made again")
             bar.update(number)
     survived = sum(int(read_attributes(part)["count"]) for part in parts)
     if survived == 0:
