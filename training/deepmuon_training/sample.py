@@ -34,9 +34,12 @@ class Sample:
     medium : str
         Geant4's name of the overburden.
     rate, rate_uncertainty : float or None
-        Muons per second and m2 of the plane, and its standard uncertainty; None where unknown.
+        Muons per second and m2 of the plane, and its statistical standard uncertainty; None where unknown.
     smoothed : bool or None
         Whether the generator's histogram steps were taken out.
+    variance_factor : float or None
+        How many times larger than of independent muons the variance of counts is: above 1 where muons come in showers;
+        None where nobody said.
     """
 
     muons: Muons
@@ -47,6 +50,7 @@ class Sample:
     rate: float | None = None
     rate_uncertainty: float | None = None
     smoothed: bool | None = None
+    variance_factor: float | None = None
 
     def __len__(self) -> int:
         """Return the number of muons."""
@@ -67,6 +71,7 @@ class Sample:
             "rate_hz_per_m2": self.rate,
             "rate_uncertainty_hz_per_m2": self.rate_uncertainty,
             "smoothed": self.smoothed,
+            "variance_factor": self.variance_factor,
         }
         return {name: value for name, value in attributes.items() if value is not None}
 
@@ -89,7 +94,7 @@ def read_sample(path: str | Path, first: int = 0, count: int | None = None) -> S
     attributes = read_attributes(path)
     rate = attributes.get("rate_hz_per_m2")
     uncertainty = attributes.get("rate_uncertainty_hz_per_m2")
-    smoothed = attributes.get("smoothed")
+    smoothed, variance_factor = attributes.get("smoothed"), attributes.get("variance_factor")
     return Sample(
         muons=read_muons(path, first, count),
         depth_m=float(attributes["depth_m"]),
@@ -99,6 +104,7 @@ def read_sample(path: str | Path, first: int = 0, count: int | None = None) -> S
         rate=None if rate is None else float(rate),
         rate_uncertainty=None if uncertainty is None else float(uncertainty),
         smoothed=None if smoothed is None else bool(smoothed),
+        variance_factor=None if variance_factor is None else float(variance_factor),
     )
 
 
