@@ -36,9 +36,12 @@ class Sample:
     medium : str
         Geant4's name of the overburden.
     rate, rate_uncertainty : float or None
-        Muons per second and m2 of the plane, and its standard uncertainty; None where unknown.
+        Muons per second and m2 of the plane, and its statistical standard uncertainty; None where unknown.
     smoothed : bool or None
         Whether the generator's histogram steps were taken out.
+    variance_factor : float or None
+        How many times larger than of independent muons the variance of counts is: above 1 where muons come in showers;
+        None where nobody said.
     """
 
     muons: Muons
@@ -49,6 +52,7 @@ class Sample:
     rate: float | None = None
     rate_uncertainty: float | None = None
     smoothed: bool | None = None
+    variance_factor: float | None = None
 
     def __len__(self) -> int:
         """Return the number of muons."""
@@ -69,6 +73,7 @@ class Sample:
             "rate_hz_per_m2": self.rate,
             "rate_uncertainty_hz_per_m2": self.rate_uncertainty,
             "smoothed": self.smoothed,
+            "variance_factor": self.variance_factor,
         }
         return {name: value for name, value in attributes.items() if value is not None}
 
@@ -95,7 +100,7 @@ def sample_of(muons: Muons, attributes: Mapping[str, Any]) -> Sample:
     """Return muons with what the attributes of a muon file say of them."""
     rate = attributes.get("rate_hz_per_m2")
     uncertainty = attributes.get("rate_uncertainty_hz_per_m2")
-    smoothed = attributes.get("smoothed")
+    smoothed, variance_factor = attributes.get("smoothed"), attributes.get("variance_factor")
     return Sample(
         muons=muons,
         depth_m=float(attributes["depth_m"]),
@@ -105,6 +110,7 @@ def sample_of(muons: Muons, attributes: Mapping[str, Any]) -> Sample:
         rate=None if rate is None else float(rate),
         rate_uncertainty=None if uncertainty is None else float(uncertainty),
         smoothed=None if smoothed is None else bool(smoothed),
+        variance_factor=None if variance_factor is None else float(variance_factor),
     )
 
 

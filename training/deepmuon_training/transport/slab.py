@@ -230,10 +230,10 @@ def _error(survived: int, started: int) -> float:
 
 
 def _rate_uncertainty(sample: Sample, fraction: float, error: float) -> float | None:
-    """Return the uncertainty of rate x fraction, or None where the rate's own is unknown."""
-    if sample.rate is None or sample.rate_uncertainty is None:
+    """Return the statistical uncertainty of rate x fraction; that of the fraction where the rate's own is unknown."""
+    if sample.rate is None or (sample.rate_uncertainty is None and error == 0):
         return None
-    return math.hypot(sample.rate_uncertainty * fraction, sample.rate * error)
+    return math.hypot((sample.rate_uncertainty or 0.0) * fraction, sample.rate * error)
 
 
 def _check_arguments(sample: Sample, thickness: float, seed: int, processes: int, overburden: str) -> None:

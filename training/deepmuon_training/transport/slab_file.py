@@ -7,6 +7,8 @@ from pathlib import Path
 
 from numpy.random import SeedSequence
 
+from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.muon_file.check import check_file
 from deepmuon_runtime.muon_file.reader import read_attributes, read_muons
 from deepmuon_runtime.muon_file.writer import MuonWriter
 from deepmuon_training.progress import progress_bar
@@ -76,6 +78,8 @@ def transport_file(
                     progress=False,
                 )
                 write_sample(parts[-1], carried.sample)
+            elif read_attributes(parts[-1])["count"] and check_file(parts[-1]).defects:
+                raise RefusedError(f"{parts[-1]} is damaged: remove it, and it is made again")
             bar.update(number)
     survived = sum(int(read_attributes(part)["count"]) for part in parts)
     refuse_none(survived, started, thickness, overburden)

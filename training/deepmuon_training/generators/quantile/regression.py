@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import torch
@@ -25,6 +25,7 @@ from deepmuon_training.generators.quantile.pinball import pinball_loss
 from deepmuon_training.learning.checkpoint import Checkpoint, fingerprint
 from deepmuon_training.learning.monotone import ConditionalMonotoneMap, MonotoneMap
 from deepmuon_training.progress import progress_bar
+from deepmuon_training.ranges import Range, check_ranges
 
 __all__ = ["RegressionSteps", "regress", "regress_conditional"]
 
@@ -66,12 +67,21 @@ class RegressionSteps:
         How many such rounds at most.
     patience
         Stop after so many rounds in a row with a larger loss than the smallest one.
+
+    Raises
+    ------
+    RefusedError
+        If a value is out of its range.
     """
 
-    adam: int = 1500
-    round: int = 500
-    rounds: int = 12
-    patience: int = 3
+    adam: Annotated[int, Range(0, 10_000_000)] = 1500
+    round: Annotated[int, Range(1, 1_000_000)] = 500
+    rounds: Annotated[int, Range(0, 1_000_000)] = 12
+    patience: Annotated[int, Range(1, 1_000_000)] = 3
+
+    def __post_init__(self) -> None:
+        """Refuse what can't be."""
+        check_ranges(self)
 
 
 def regress_conditional(
