@@ -201,6 +201,20 @@ def test_whatever_the_command_line_is_a_file_records_it(model_file, tmp_path, mo
     assert not check_file(tmp_path / "muons.h5").defects
 
 
+@pytest.mark.parametrize("seed", [1.7, 1.0, "1", np.float64(1)])
+def test_a_seed_that_is_no_whole_number_is_refused(model_file, tmp_path, seed):
+    generator = Generator.open(file=model_file)
+    with pytest.raises(RefusedError, match="is not a whole number"):
+        generator.sample(1, seed=seed)
+    with pytest.raises(RefusedError, match="is not a whole number"):
+        generator.write(tmp_path / "muons.h5", 1, seed)
+
+
+def test_a_seed_may_be_of_numpy(model_file):
+    generator = Generator.open(file=model_file)
+    assert are_equal(generator.sample(10, seed=np.uint64(2**64 - 1)), generator.sample(10, seed=2**64 - 1))
+
+
 def test_a_model_without_a_rate_gives_files_without_live_time(tmp_path):
     content = tiny_model(metadata={"rate_hz_per_m2": None, "rate_uncertainty_hz_per_m2": None})
     generator = opened(tmp_path, content)

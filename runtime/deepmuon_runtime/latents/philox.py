@@ -8,6 +8,7 @@ numpy promises never to change, unlike the methods of its Generator.
 
 from __future__ import annotations
 
+import operator
 import secrets
 
 import numpy as np
@@ -48,10 +49,14 @@ def new_seed() -> int:
 
 
 def checked_seed(seed: int) -> int:
-    """Return the seed if it is one, from 0 to 2^64 - 1, else raise RefusedError."""
-    if not 0 <= seed <= LARGEST_SEED:
+    """Return the seed if it is one, a whole number from 0 to 2^64 - 1, else raise RefusedError."""
+    try:
+        whole = operator.index(seed)
+    except TypeError as error:
+        raise RefusedError(f"the seed {seed!r} is not a whole number, as 1 and 12345 are") from error
+    if not 0 <= whole <= LARGEST_SEED:
         raise RefusedError(f"the seed {seed} is not from 0 to 2^64 - 1 ({LARGEST_SEED})")
-    return int(seed)
+    return whole
 
 
 def words(seed: int, stream: int, first: int, count: int) -> NDArray[np.uint64]:

@@ -142,6 +142,15 @@ def test_overwriting_replaces_the_file_at_the_end_and_not_before(tmp_path):
     assert len(read_muons(path)) == 4
 
 
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o666])
+def test_a_file_that_is_replaced_keeps_its_mode(tmp_path, mode):
+    path = tmp_path / "muons.h5"
+    write_muons(path, some_muons(3), PLANE)
+    path.chmod(mode)
+    write_muons(path, some_muons(4), PLANE, overwrite=True)
+    assert (len(read_muons(path)), stat.S_IMODE(path.stat().st_mode)) == (4, mode)
+
+
 @pytest.fixture(params=[None, errno.EPERM], ids=["hard links", "no hard links"])
 def file_system(request, monkeypatch):
     """A file system with hard links, and one without."""
@@ -312,6 +321,7 @@ def test_a_link_is_followed(tmp_path):
         ("", "is a folder"),
         ("folder", "is a folder"),
         ("pipe", "is a device or a pipe"),
+        ("loop", "is a symbolic link that leads back to itself"),
         ("missing/muons.h5", "there is no folder"),
         ("file/muons.h5", "there is no folder"),
         ("a\0b", "can't be written"),
@@ -322,6 +332,8 @@ def test_a_path_that_can_not_be_a_file_is_refused(tmp_path, name, reason):
     (tmp_path / "folder").mkdir()
     (tmp_path / "file").touch()
     os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "loop").symlink_to("pool")
+    (tmp_path / "pool").symlink_to("loop")
     path = f"{tmp_path}/{name}"
     before = set(tmp_path.rglob("*"))
     with pytest.raises(RefusedError, match=reason):
