@@ -5,9 +5,7 @@ from __future__ import annotations
 import collections.abc
 import hashlib
 import os
-import shlex
 import shutil
-import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
@@ -288,7 +286,6 @@ class Generator:
             "model_sha256": model.sha256,
             "architecture": model.architecture,
             "device": self.device,
-            "command_line": _command_line(),
             **{name: rate for name, rate in rates.items() if rate is not None},
         }
 
@@ -377,12 +374,6 @@ def _block_draws(model: Model, device: str) -> int:
     # Multiples of 8 draws where they fit: a block then begins with a whole step of the random number generator.
     step = 8 if 8 * size <= BLOCK[device] else 1
     return -(-BLOCK[device] // (step * size)) * step
-
-
-def _command_line() -> str:
-    """Return the command that runs, for a shell; of a name that is no text the bytes are escaped."""
-    program, *arguments = getattr(sys, "argv", None) or [""]  # a program that embeds Python may give none
-    return shlex.join([Path(program).name, *arguments]).encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def _usable_processors() -> int:

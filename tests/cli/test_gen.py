@@ -56,8 +56,17 @@ def test_the_main_job_gives_the_muons_of_the_model_and_says_so(gen):
     expected = Generator.open(10).sample(1000, seed=7)
     assert np.array_equal(read_muons("muons.h5").kinetic_energy, expected.kinetic_energy)
     attributes = read_attributes("muons.h5")
-    assert attributes["command_line"] == "deepmuon-gen --depth 10 -n 1_000 -o muons.h5 --seed 7"
+    assert attributes["command_line"] == "deepmuon-gen --depth 10.0 --number 1000 --seed 7"
     assert attributes["live_time_s_m2"] == 1000 / 55.5
+
+
+def test_no_name_of_a_file_is_recorded(gen, model_file):
+    """It could hold a secret, and the model is known by its hash."""
+    secret = model_file.rename(model_file.with_name("secret.onnx"))
+    assert gen("--model", secret, "-n", 10, "--threads", 1, "-q", "-o", "secret.h5") == (0, "", "")
+    assert read_attributes("secret.h5")["command_line"] == "deepmuon-gen --number 10 --threads 1"
+    with open("secret.h5", "rb") as file:
+        assert b"secret" not in file.read()
 
 
 def test_a_model_of_ones_own_is_taken_from_its_file(gen, model_file):

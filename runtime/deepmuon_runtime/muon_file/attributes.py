@@ -68,11 +68,11 @@ GENERATED = {
     "model_sha256": _Rule(lambda x: isinstance(x, str) and bool(re.fullmatch("[0-9a-f]{64}", x)), "64 hex digits"),
     "architecture": NAME,
     "device": _Rule(lambda x: isinstance(x, str) and x in ("cpu", "cuda"), '"cpu" or "cuda"'),
-    "command_line": TEXT,
 }
 CONVERTED = {"source": TEXT, "provenance": TEXTS}
 WHERE_KNOWN = {
     "smoothed": _Rule(lambda x: isinstance(x, bool), "true or false"),
+    "command_line": TEXT,
     "rate_hz_per_m2": POSITIVE,
     "rate_uncertainty_hz_per_m2": NOT_NEGATIVE,
     "live_time_s_m2": NOT_NEGATIVE,

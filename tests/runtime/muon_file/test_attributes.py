@@ -65,7 +65,10 @@ def test_the_attributes_of_a_released_model_are_its_own():
     ]
 
 
-@pytest.mark.parametrize("name", [*ALWAYS.keys() - {"rate_uncertainty_hz_per_m2"}, *GENERATED.keys() - ALWAYS.keys()])
+NOT_NEEDED = {"rate_uncertainty_hz_per_m2", "command_line"}
+
+
+@pytest.mark.parametrize("name", sorted(GENERATED.keys() - NOT_NEEDED))
 def test_a_generated_file_has_all_attributes(name):
     (defect,) = attribute_defects({key: value for key, value in GENERATED.items() if key != name}, None)
     assert name in defect
