@@ -38,18 +38,26 @@ def csv(file: Path, output: Path, units: str, no_header: bool, overwrite: bool) 
         1001
 
     Columns: kinetic energy in GeV or MeV; direction of motion u, v, w, a unit vector, z up; pdg_id, 13 for mu- and -13
-    for mu+. Nine digits keep every number as it is in the file.
+    for mu+. Nine digits keep every number as it is in the file. A damaged file gives no text: for stdout it is read
+    twice, and verified before the first line.
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime.errors import RefusedError
+    from deepmuon_runtime.files.output import check_output
     from deepmuon_runtime.files.whole import whole_file
-    from deepmuon_runtime.views.text import csv_pieces
+    from deepmuon_runtime.muon_file.reader import read_attributes, verify_muons
+    from deepmuon_runtime.room import check_disk
+    from deepmuon_runtime.views.text import SHORTEST_LINE, csv_pieces
 
     pieces = (piece.encode() for piece in csv_pieces(file, unit=units, header=not no_header))
     if str(output) == "-":
+        verify_muons(file, progress=lambda _: show_life())
         _print(pieces)
         return
-    if output.exists() and file.exists() and output.samefile(file):
+    number = read_attributes(file)["count"]
+    folder = check_output(output, overwrite=True).parent
+    if output.exists() and output.samefile(file):
         raise RefusedError(f"{output} is the muon file itself, which the text would replace: give another name")
+    check_disk(folder, number * SHORTEST_LINE, f"{number:,} lines")
     with whole_file(output, overwrite=overwrite) as text:
         for piece in pieces:
             text.write(piece)

@@ -135,10 +135,10 @@ def gen(
         raise click.UsageError("where to? Give the name of a file: -o muons.h5")
 
     from deepmuon_runtime import Generator, new_seed
-    from deepmuon_runtime.files.output import check_output
     from deepmuon_runtime.latents.shard import WHOLE_RUN
+    from deepmuon_runtime.muon_file.output import check_muon_output
 
-    check_output(output, overwrite)
+    check_muon_output(output, overwrite)
     generator = Generator.open(depth, architecture, file=model, device=device, threads=threads)
     seed = new_seed() if seed is None else seed
     attributes: dict[str, object] = {"command_line": _command_line(context)}

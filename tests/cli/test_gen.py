@@ -69,6 +69,33 @@ def test_no_name_of_a_file_is_recorded(gen, model_file):
         assert b"secret" not in file.read()
 
 
+@pytest.mark.parametrize(
+    ("output", "reason"),
+    [
+        (
+            "-",
+            "- is no name of a muon file, which can't go to stdout: give one, as in -o muons.h5, and then",
+        ),
+        ("/dev/stdout", "/dev/stdout is a device or a pipe: give the name of a regular file"),
+        (
+            "muons.csv",
+            "muons.csv would be HDF5 under a name of text: write muons.h5, and then deepmuon-csv muons.h5",
+        ),
+        ("muons.root", "muons.root would be HDF5 under a name of ROOT: write muons.h5, and then read it in Python"),
+        ("muons.parquet", "muons.parquet would be HDF5 under a name of Parquet"),
+        ("muons.mcpl", "muons.mcpl would be HDF5 under a name of MCPL"),
+    ],
+)
+def test_an_output_that_promises_what_is_not_hdf5_is_refused(tmp_path, model_file, output, reason):
+    """With stdout a pipe."""
+    words = [*COMMAND, "--model", str(model_file), "-n", "10", "-o", output]
+    before = set(tmp_path.iterdir())
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert reason in done.stderr
+    assert set(tmp_path.iterdir()) == before
+
+
 def test_a_model_of_ones_own_is_taken_from_its_file(gen, model_file):
     assert gen("--model", model_file, "-n", 10, "-o", "muons.h5")[0] == 0
     assert len(read_muons("muons.h5")) == 10

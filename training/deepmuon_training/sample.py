@@ -72,7 +72,7 @@ class Sample:
 
 
 def read_sample(path: str | Path, first: int = 0, count: int | None = None) -> Sample:
-    """Read a sample, or a part of it, from a muon file of version 1.
+    """Read a sample, or a part of it, from a muon file. The whole of it is verified by its checksums, a part can't be.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def read_sample(path: str | Path, first: int = 0, count: int | None = None) -> S
     Raises
     ------
     RefusedError
-        If the file is no such file, or does not hold the muons asked for.
+        If the file is no muon file or a damaged one, or does not hold the muons asked for.
     """
     attributes = read_attributes(path)
     rate = attributes.get("rate_hz_per_m2")
@@ -103,7 +103,7 @@ def read_sample(path: str | Path, first: int = 0, count: int | None = None) -> S
 
 
 def write_sample(path: str | Path, sample: Sample, *, overwrite: bool = False) -> None:
-    """Write a sample as a muon file of version 1.
+    """Write a sample as a muon file.
 
     Raises
     ------

@@ -104,7 +104,7 @@ def test_a_converted_file_has_all_attributes(name):
         ("model_sha256", "0" * 63),
         ("model_sha256", "G" * 64),
         ("device", "abacus"),
-        ("rate_hz_per_m2", 0.0),
+        ("rate_hz_per_m2", -1.0),
         ("rate_hz_per_m2", float("inf")),
         ("rate_uncertainty_hz_per_m2", -1.0),
         ("area_m2", 0),

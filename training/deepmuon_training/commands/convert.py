@@ -115,12 +115,12 @@ def command(input_file: Path, output: Path, form: str, overwrite: bool, quiet: b
     is asked for where the format is CRY's.
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime import new_seed
-    from deepmuon_runtime.files.output import check_output
+    from deepmuon_runtime.muon_file.output import check_muon_output
     from deepmuon_training.data.conversion import draw_charges
     from deepmuon_training.sample import write_sample
 
     _check_options(form, stated)
-    check_output(output, overwrite)
+    check_muon_output(output, overwrite)
     sample = _smoothed(_read(input_file, form, stated), stated["smooth"])
     if stated["charge"] is not None:
         sample = draw_charges(sample, stated["charge"], new_seed() if stated["seed"] is None else stated["seed"])

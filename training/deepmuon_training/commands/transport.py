@@ -73,11 +73,11 @@ def command(
     same survivors for any --processes. Muons that have a depth already can go on only in the material above them.
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime import new_seed
-    from deepmuon_runtime.files.output import check_output
+    from deepmuon_runtime.muon_file.output import check_muon_output
     from deepmuon_training.sample import read_sample, write_sample
     from deepmuon_training.transport.slab import transport
 
-    check_output(output, overwrite)
+    check_muon_output(output, overwrite)
     seed = new_seed() if seed is None else seed
     carried = transport(
         read_sample(muons),
