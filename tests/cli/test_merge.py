@@ -8,7 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from support.muon_files import sign_attributes
+from support.muon_files import sign, sign_attributes
 from support.tiny_models import tiny_model
 
 from deepmuon_runtime import Generator, RefusedError, Shard, read_attributes, read_muons
@@ -314,3 +314,34 @@ def test_a_damaged_shard_is_not_merged(merge, generator, tmp_path, options):
     assert (code, out) == (2, "")
     assert f"{names[1]} is damaged: the column kinetic_energy is not what was written" in err
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*names, "tiny.onnx"])
+
+
+def add_places_and_times(path: Path, start: float) -> dict[str, np.ndarray]:
+    with h5py.File(path, "r+") as file:
+        n = len(file["muons/u"])
+        columns = {name: np.full(n, start, np.float32) for name in "xyz"} | {"time": start + np.arange(n, dtype=float)}
+        for name, values in columns.items():
+            file["muons"].create_dataset(name, data=values).attrs["units"] = "s" if name == "time" else "m"
+        sign(file["muons"])
+    return columns
+
+
+@pytest.mark.parametrize("options", [[], ["--virtual"]], ids=["copied", "virtual"])
+def test_places_and_times_are_taken_along(merge, generator, tmp_path, options):
+    names = write_shards(generator, tmp_path, "1/2", "2/2", n=1000)
+    parts = [add_places_and_times(tmp_path / name, start) for name, start in zip(names, (0, 1000), strict=True)]
+    assert merge(*options, *names, "-o", "all.h5")[0] == 0
+    assert check(tmp_path / "all.h5")[0] == 0
+    with h5py.File(tmp_path / "all.h5") as file:
+        for name in ("x", "y", "z", "time"):
+            assert np.array_equal(file["muons"][name][:], np.concatenate([part[name] for part in parts]))
+
+
+@pytest.mark.parametrize("options", [[], ["--virtual"]], ids=["copied", "virtual"])
+def test_shards_with_times_and_without_are_not_joined(merge, generator, tmp_path, options):
+    names = write_shards(generator, tmp_path, "1/2", "2/2", n=1000)
+    add_places_and_times(tmp_path / names[1], 0)
+    code, _, err = merge(*options, *names, "-o", "all.h5")
+    assert code == 2
+    assert "their columns are kinetic_energy, u, v, w, pdg_id and kinetic_energy, u, v, w, pdg_id, x, y, z, time" in err
+    assert not (tmp_path / "all.h5").exists()
