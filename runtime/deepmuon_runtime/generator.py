@@ -5,9 +5,6 @@ from __future__ import annotations
 import collections.abc
 import hashlib
 import os
-import shlex
-import shutil
-import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
@@ -20,17 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import FailedError, RefusedError, first_line
-from deepmuon_runtime.files.output import check_output
 from deepmuon_runtime.latents.philox import checked_seed, fill_latents, new_seed
 from deepmuon_runtime.latents.poisson import poisson
 from deepmuon_runtime.latents.shard import WHOLE_RUN, Shard
 from deepmuon_runtime.model.metadata import LATENTS_PER_MUON, Model
 from deepmuon_runtime.model.released import read_released, released_model
 from deepmuon_runtime.muon_file.format import BYTES_PER_MUON
+from deepmuon_runtime.muon_file.output import check_muon_output
 from deepmuon_runtime.muon_file.writer import MuonWriter
 from deepmuon_runtime.muons import MU_PLUS, Muons
 from deepmuon_runtime.ordered_map import ordered_map
 from deepmuon_runtime.physical import check_physical
+from deepmuon_runtime.room import check_disk, check_memory
 
 if TYPE_CHECKING:
     import onnxruntime
@@ -163,10 +161,12 @@ class Generator:
             If the model gives an unphysical muon.
         """
         numbers, seed = checked_numbers(n, first), _seed(seed)
+        instead = "take them in chunks, or write a file"
+        check_memory(len(numbers) * BYTES_PER_MUON, f"{n} muons", instead)
         try:
             muons = Muons.empty(len(numbers))
         except (MemoryError, ValueError) as error:
-            raise RefusedError(f"{n} muons do not fit in memory: take them in chunks, or write a file") from error
+            raise RefusedError(f"{n} muons do not fit in memory: {instead}") from error
 
         def fill(part: range) -> None:
             self._fill(muons[part.start - numbers.start : part.stop - numbers.start], seed, part.start)
@@ -239,7 +239,8 @@ class Generator:
         """
         total, seed = len(checked_numbers(n)), _seed(seed)
         numbers = shard.numbers(total)
-        _check_space(check_output(path, overwrite).parent, len(numbers))
+        folder = check_muon_output(path, overwrite).parent
+        check_disk(folder, len(numbers) * BYTES_PER_MUON, f"{len(numbers):,} muons")
         described = {**self._attributes(seed, shard, total), **(attributes or {})}
         chunks = self.chunks(len(numbers), seed, first=numbers.start)
         with MuonWriter(path, described, overwrite) as writer, closing(chunks):
@@ -293,7 +294,6 @@ class Generator:
             "model_sha256": model.sha256,
             "architecture": model.architecture,
             "device": self.device,
-            "command_line": _command_line(),
             **{name: rate for name, rate in rates.items() if rate is not None},
         }
 
@@ -384,12 +384,6 @@ def _block_draws(model: Model, device: str) -> int:
     return -(-BLOCK[device] // (step * size)) * step
 
 
-def _command_line() -> str:
-    """Return the command that runs, for a shell; of a name that is no text the bytes are escaped."""
-    program, *arguments = getattr(sys, "argv", None) or [""]  # a program that embeds Python may give none
-    return shlex.join([Path(program).name, *arguments]).encode("utf-8", "backslashreplace").decode("utf-8")
-
-
 def _usable_processors() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
@@ -408,18 +402,3 @@ def checked_numbers(n: float, first: float = 0) -> range:
 
 def _seed(seed: int | None) -> int:
     return new_seed() if seed is None else checked_seed(seed)
-
-
-def _check_space(folder: Path, n: int) -> None:
-    needed = n * BYTES_PER_MUON
-    free = shutil.disk_usage(folder).free
-    if needed > free:
-        raise RefusedError(f"{n:,} muons need {_readable(needed)}, and {folder} has {_readable(free)} free")
-
-
-def _readable(size: float) -> str:
-    for unit in ("bytes", "kB", "MB", "GB", "TB"):
-        if size < 1000:
-            return f"{size:.3g} {unit}"
-        size /= 1000
-    return f"{size:.3g} PB"

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import errno
 import os
+import stat
 import warnings
+from contextlib import suppress
 from pathlib import Path
 
 from deepmuon_runtime.errors import reason
@@ -22,7 +24,7 @@ def publish(partial: Path, target: Path, overwrite: bool) -> None:
     target
         The name it gets.
     overwrite
-        Whether a file of that name is replaced.
+        Whether a file of that name is replaced, whose mode it then takes.
 
     Raises
     ------
@@ -32,6 +34,8 @@ def publish(partial: Path, target: Path, overwrite: bool) -> None:
         If the file system refuses otherwise. Then the name is not given.
     """
     if overwrite:
+        with suppress(OSError):  # there is none, or no modes
+            os.chmod(partial, stat.S_IMODE(os.stat(target).st_mode))
         os.replace(partial, target)
     else:
         _link(partial, target)

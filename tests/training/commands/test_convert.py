@@ -249,3 +249,10 @@ def test_an_existing_output_is_replaced_only_where_asked(convert, tmp_path):
     assert (tmp_path / "muons.h5").read_text() == "precious"
     assert convert("csv", STATED["csv"], "--overwrite -q") == ""
     assert len(read_muons(tmp_path / "muons.h5")) == 2
+
+
+@pytest.mark.parametrize("output", ["muons.csv", "muons.root", "-"])
+def test_an_output_that_promises_what_is_not_hdf5_is_refused(convert, tmp_path, output):
+    with pytest.raises(RefusedError, match=r"would be HDF5 under a name of|- is no name of a muon file"):
+        convert("csv", STATED["csv"], output=output)
+    assert [path.name for path in tmp_path.iterdir()] == ["input"]

@@ -92,6 +92,8 @@ def test_without_a_seed_every_run_is_another(source, tmp_path):
         ("-n 10 --charge-ratio 0 -o muons.h5", "0 is not a finite number above 0"),
         ("-n 10 --seed -1 -o muons.h5", "-1 is not from 0 to 2^64 - 1"),
         ("-n 10 -o no/muons.h5", "there is no folder"),
+        ("-n 10 -o muons.parquet", "muons.parquet would be HDF5 under a name of Parquet"),
+        ("-n 10 -o -", "- is no name of a muon file"),
     ],
 )
 def test_bad_options_are_refused(source, tmp_path, options, reason):
