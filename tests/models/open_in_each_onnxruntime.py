@@ -25,11 +25,14 @@ OF_THE_CONTRACT = 17  # minor version: docs/onnx_contract.md
 WITH_NUMPY_1 = 18  # the last minor version that was built for NumPy 1 alone
 
 SAMPLE = """
+from importlib.resources import files
+
 from deepmuon_runtime import Generator, list_models
 
 models = list_models()
 for model in models:
     assert len(Generator.open(model.depth_m, model.architecture).sample(20_000, seed=1)) == 20_000
+    Generator.open(file=files("deepmuon_models") / model.name)  # as a stranger's, with a trial
 print(f"{len(models)} models sampled by the package")
 """
 
