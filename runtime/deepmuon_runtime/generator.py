@@ -43,6 +43,7 @@ LARGEST_NUMBER = 2**53
 # Muons of one run of the network, about: what it works on stays in a CPU's cache; a GPU wants much at once.
 BLOCK = {"cpu": 1 << 14, "cuda": 1 << 18}
 PIECE = {"cpu": 1 << 17, "cuda": 1 << 18}  # muons of one task of a thread, and of one write, in whole blocks
+TRIED = 5  # values of the latents, before the first muons: the ends, the middle, and two between
 LARGEST_MODEL = 2**31 - 1  # bytes: the limit of protobuf, and so of an ONNX file without external data
 
 Outputs = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int8]]  # energy, direction, charge
@@ -129,12 +130,14 @@ class Generator:
                 raise RefusedError("a model's file decides its depth and architecture: give the file alone")
             name, content = str(file), _read_model(Path(file))
         check_onnx_file(content, name)
+        if file is not None:
+            cls._try_memory(content, name)
         session, device = open_session(content, name, device)
         sha256 = hashlib.sha256(content).hexdigest()
         model = Model.from_metadata(contract_metadata(session, name), name, sha256, len(content))
         check_signature(session, model)
         generator = cls(session, model, device, threads)
-        generator._try()
+        generator._try(TRIED)
         return generator
 
     def sample(self, n: int, seed: int | None = None, *, first: int = 0) -> Muons:
@@ -333,7 +336,9 @@ class Generator:
         try:
             energy, direction, charge = run()
         except Exception as error:  # ONNX Runtime's own classes have no common base
-            reason = first_line(error)
+            from deepmuon_runtime.model.trial import memory_asked
+
+            reason = memory_asked(error) or first_line(error)
             raise FailedError(f"the model {self.model.name} failed: {reason}") from error
         kept = slice(skipped, skipped + len(muons))
         muons.kinetic_energy[:] = energy[kept]
@@ -341,15 +346,29 @@ class Generator:
             column[:] = direction[kept, axis]
         np.multiply(charge[kept], np.int8(MU_PLUS), out=muons.pdg_id)
 
-    def _try(self) -> None:
-        """Refuse a model that fails at the ends or in the middle of its latents."""
-        latent = np.repeat(np.linspace(-1, 1, 5, dtype=np.float32)[:, None], self.model.latent_size, axis=1)
+    @classmethod
+    def _try_memory(cls, content: bytes, name: str) -> None:
+        """Refuse a model of which a block of muons takes too much memory, before it is loaded for good."""
+        from deepmuon_runtime.model.contract import check_signature, contract_metadata
+        from deepmuon_runtime.model.trial import open_for_trial, returning_memory
+
+        session = open_for_trial(content, name)
+        model = Model.from_metadata(contract_metadata(session, name), name, "", len(content))
+        check_signature(session, model)
+        generator = cls(session, model, "cpu", threads=1)
+        for draws in (TRIED, generator._block_draws):
+            generator._try(draws, returning_memory())
+
+    def _try(self, draws: int, options: onnxruntime.RunOptions | None = None) -> None:
+        """Refuse a model that fails at the ends or in the middle of its latents, in so many draws."""
+        values = np.resize(np.linspace(-1, 1, TRIED, dtype=np.float32), draws)
+        latent = np.repeat(values[:, None], self.model.latent_size, axis=1)
         muons = Muons.empty(len(latent) * self.model.muons_per_draw)
 
         def run() -> Outputs:
             from deepmuon_runtime.model.contract import INPUT, OUTPUTS
 
-            energy, direction, charge = self._session.run(OUTPUTS, {INPUT: latent})
+            energy, direction, charge = self._session.run(OUTPUTS, {INPUT: latent}, options)
             if not len(energy) == len(direction) == len(charge) == len(muons):
                 raise ValueError(
                     f"it gave {len(energy)} energies, {len(direction)} directions and {len(charge)} charges, "
@@ -365,8 +384,8 @@ class Generator:
 
 
 def _read_model(path: Path) -> bytes:
-    if path.is_dir() or (path.exists() and not path.is_file()):
-        raise RefusedError(f"{path} is no ONNX file")
+    if path.exists() and not path.is_file():
+        raise RefusedError(f"{path} is no ONNX file: it is a folder, a pipe or a device")
     try:
         if path.stat().st_size > LARGEST_MODEL:
             raise RefusedError(f"{path} is no ONNX file: it is larger than 2 GB")

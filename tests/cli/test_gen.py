@@ -14,7 +14,7 @@ import pytest
 from support.tiny_models import RARELY_BAD, tiny_model
 
 from deepmuon_cli.gen import main
-from deepmuon_cli.process.ending import SIGNALS
+from deepmuon_cli.process.signals import SIGNALS
 from deepmuon_runtime import Generator, Muons, read_attributes, read_muons
 
 COMMAND = [sys.executable, "-m", "deepmuon_cli.gen"]

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
-import sys
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from support.commands import endings
 from support.damage import DAMAGES, cut_out, overwrite, repeat, truncate
 from support.thorough import TIMES
 from support.tiny_models import tiny_model
@@ -20,22 +17,7 @@ from deepmuon_runtime import Generator, Shard, check_file, list_models
 from deepmuon_runtime.files.partial import PARTIAL_SUFFIX
 from deepmuon_runtime.model.released import read_released
 
-RUN_MANY = Path(__file__).parents[1] / "support" / "run_many.py"
 SEED = 4
-
-
-def endings(command: str, lines: list[list[str]]) -> list[int]:
-    """Run a command with each line of arguments, and return the exit codes."""
-    done = subprocess.run(
-        [sys.executable, RUN_MANY, command],
-        input="".join(f"{json.dumps(line)}\n" for line in lines),
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # no thread may run when a process forks
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert "Traceback" not in done.stderr
-    return [int(code) for code in done.stdout.split()]
 
 
 def damaged_models(folder: Path, count: int, seed: int = SEED) -> list[Path]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import onnxruntime
 
-from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.errors import RefusedError, shown
 from deepmuon_runtime.model.metadata import METADATA_PREFIX, Model
 
 __all__ = ["INPUT", "OUTPUTS", "check_signature", "contract_metadata"]
@@ -59,11 +59,12 @@ def _check_nodes(
         raise RefusedError(f"{name} breaks the contract: the name of an {role} is no text in UTF-8") from error
     if found.keys() != expected.keys():
         raise RefusedError(
-            f"{name} breaks the contract: its {role}s are {', '.join(found)}, and should be {', '.join(expected)}"
+            f"{name} breaks the contract: its {role}s are {shown(', '.join(found))}, "
+            f"and should be {', '.join(expected)}"
         )
     for node, (kind, shape) in expected.items():
         if found[node] != (kind, shape):
             raise RefusedError(
-                f"{name} breaks the contract: its {role} {node} is {found[node][0]} {found[node][1]}, "
+                f"{name} breaks the contract: its {role} {node} is {found[node][0]} {shown(str(found[node][1]))}, "
                 f"and should be {kind} {shape}"
             )

@@ -195,6 +195,7 @@ class MuonWriter:
             if kind is None:
                 with self._partial.failures():
                     self._in_thread(self._finish)
+                    self._in_thread(self._close)  # an open file gets no other name on Windows
                     self._partial.publish()
         finally:
             self._discard()

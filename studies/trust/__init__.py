@@ -1,0 +1,1 @@
+"""Whether DeepMuon can be trusted: campaigns of faults, damaged files and repetitions."""
