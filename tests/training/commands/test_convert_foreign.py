@@ -198,6 +198,18 @@ def test_headings_name_units_and_text_is_skipped(convert, refuse):
     assert out[1] == "input, columns skip, E [TeV], theta [rad], phi [rad], skip: 1 row"
 
 
+def test_a_table_of_pandas_with_its_row_numbers_is_read(convert):
+    muons, out, _ = convert(",Ekin_GeV,u,v,w,charge\n0,2.5,0.6,0,-0.8,-1\n1,0.5,0,0,-1,1\n", "--format csv")
+    assert_muons(muons, [2.5, 0.5], [[0.6, 0, -0.8], [0, 0, -1]], [13, -13])
+    assert out[1] == "input, columns skip, E [GeV], u, v, w, charge: 2 rows"
+
+
+def test_columns_that_nobody_names_are_asked_for(refuse):
+    assert refuse("4000,.1,.2\n", "--format csv --charge -1") == (
+        "input has no heading that names its 3 columns (it begins with '4000,.1,.2'): give --columns"
+    )
+
+
 def test_columns_are_named_by_their_headings(convert):
     text = "event,KE_MeV,x,dir_z,dir_x,dir_y,who\n1,2150,0,0.8,0.6,0,mu-\n"
     muons, _, _ = convert(text, "--format csv --columns u=dir_x,v=dir_y,-w=dir_z,E=KE_MeV --charge -1")
