@@ -2,8 +2,8 @@
 
 python -m studies.measured_flux.fit
 
-Prints the parameters, which stand in deepmuon_training/fluxes/measured.py, and writes fit.json, fit.md, fit.png,
-rates.md and shape.png beside itself. Half a minute.
+Prints the parameters, which stand in deepmuon_training/fluxes/measured.py, and writes parameters.md, fit.md, rates.md,
+fit.json, fit.png and shape.png beside itself. Half a minute.
 """
 
 from __future__ import annotations
@@ -204,6 +204,14 @@ def shape_scores(flux: Intensity, other: Intensity, cosines: Float) -> list[Scor
     return found
 
 
+def parameter_rows(best: Fit) -> list[tuple[str, ...]]:
+    """Return a table of the parameters: its head, and a row for each."""
+    symbols = ("$A$", "$\\gamma$", "$X_p$ / (g/cm²)", "$a$ / (GeV cm²/g)", "$f_+$", "$B_0$ / GeV", "$k$")
+    errors = np.sqrt(np.diag(best.covariance))
+    values = zip(symbols, astuple(best.parameters), errors, strict=True)
+    return [("fitted", "value", "error"), *((name, f"{value:.5g}", f"{error:.2g}") for name, value, error in values)]
+
+
 def _table(rows: list[tuple[str, ...]]) -> str:
     """Return a table in Markdown, whose first row is its head."""
     head, *body = rows
@@ -245,6 +253,7 @@ def main(compare: Path | None) -> None:
     here.with_suffix(".json").write_text(json.dumps(numbers, indent=1) + "\n", encoding="utf-8")
     head = ("what", "asked", "found")
     here.with_suffix(".md").write_text(_table([head, *((s.what, s.asked, s.found) for s in found)]), encoding="utf-8")
+    here.with_name("parameters.md").write_text(_table(parameter_rows(best)), encoding="utf-8")
     here.with_name("rates.md").write_text(_table(rate_rows(integrated)), encoding="utf-8")
     draw_fit(flux).savefig(here.with_suffix(".png"), dpi=110)
     draw_shape(flux).savefig(here.with_name("shape.png"), dpi=110)

@@ -21,7 +21,7 @@ FILE = click.Path(path_type=Path)
     default="ecomug",
     metavar="FLUX",
     show_default=True,
-    help="measured, gccly, ecomug or TABLE.csv, see below.",
+    help="measured, gccly, ecomug or TABLE.csv, see above.",
 )
 @click.option(
     "--charge-ratio",
