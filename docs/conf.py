@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
 
-from deepmuon_training.transport.geant4_data import without_data_sets
-
-sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
-os.environ.update(without_data_sets())  # for the modules that import geant4_pybind
+DOCS = Path(__file__).parent
+# The training package is read from its sources: installing it would bring PyTorch and Geant4. The root is for studies.
+sys.path[:0] = [str(DOCS / "_extensions"), str(DOCS.parent), str(DOCS.parent / "training")]
 
 project = "DeepMuon"
 author = "The DeepMuon developers"
@@ -18,6 +16,7 @@ copyright = f"2026, {author}"
 release = version = version_of("deepmuon-runtime")
 
 extensions = [
+    "floor_plan",
     "include_all",
     "live_page",
     "mathml",
@@ -28,7 +27,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_click",
 ]
-exclude_patterns = ["_build", "benchmark.md", "engines.md", "experiments", "measured.md"]
+exclude_patterns = ["_build"]
 default_role = "py:obj"  # `name` in a docstring is Python's
 smartquotes = False  # options have two dashes
 
@@ -36,6 +35,7 @@ myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"
+autodoc_mock_imports = ["geant4_pybind", "onnx", "torch"]  # gigabytes that a page does not need
 autodoc_typehints = "signature"
 autodoc_default_options = {"members": True}
 napoleon_google_docstring = False

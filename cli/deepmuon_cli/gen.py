@@ -12,7 +12,16 @@ from typing import TYPE_CHECKING, NoReturn
 import click
 
 from deepmuon_cli.options.completion import architectures, depths, devices
-from deepmuon_cli.options.quantities import muon_number, positive_number, seed_number, shard_number
+from deepmuon_cli.options.mistyped import HelpfulCommand
+from deepmuon_cli.options.quantities import (
+    metres,
+    muon_number,
+    seconds,
+    seed_number,
+    shard_number,
+    square_metres,
+    thread_number,
+)
 from deepmuon_cli.process.ending import run
 
 if TYPE_CHECKING:  # the libraries are imported when they are needed: --help is answered at once
@@ -22,12 +31,51 @@ __all__ = ["gen", "main"]
 
 NAME = "deepmuon-gen"
 FILE = click.Path(path_type=Path)
+BETWEEN_LINES = 30.0  # s, of progress in a log
+
+CUTS = "every muon of the model is written: keep those you want when you read the file"
+MEDIA = "the released models are under water; deepmuon-train transport takes their muons through other materials"
+LEADS = {
+    **dict.fromkeys(("--energy-min", "--energy-max", "--emin", "--emax", "--min-energy", "--max-energy"), CUTS),
+    **dict.fromkeys(("--zenith-min", "--zenith-max", "--charge", "--energy", "--zenith"), CUTS),
+    **dict.fromkeys(("--material", "--medium", "--rock", "--density"), MEDIA),
+    "--flux": "a model has its own, which is CRY's for the released ones",
+    **dict.fromkeys(("--format", "--csv", "--text", "--root"), "the file is HDF5, and deepmuon-csv writes text of it"),
+    **dict.fromkeys(("--gpu", "--cuda"), "write --device cuda"),
+    **dict.fromkeys(("--time", "--exposure", "--duration"), "write --live-time SECONDS --area M2"),
+    **dict.fromkeys(("-N", "--n", "--muons", "--events", "--count", "--size"), "write -n 1e6"),
+    **dict.fromkeys(("--cores", "--jobs", "-j", "-t"), "write --threads"),
+    **dict.fromkeys(("--file", "--to"), "write -o muons.h5"),
+    "-d": "write --depth",
+    "-m": "write --model FILE",
+    "-s": "write --seed",
+    "-f": "write --overwrite",
+    "--force": "write --overwrite",
+    "-v": "write --version",
+    "-l": "write --list",
+}
+"""What to say to options that users try."""
+
+VALUES = {
+    "--depth": r"[0-9.,]+ ?m?",
+    "-n": r"[0-9.,_]+([eE][0-9]+)?",
+    "--model": r".*\.onnx",
+    "--architecture": r"quantile|transformer",
+    "-o": r".*\.(h5|hdf5|csv|root|txt)",
+}
+"""What a word looks like whose option was forgotten."""
 
 
-@click.command(name=NAME, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.command(
+    name=NAME,
+    cls=HelpfulCommand,
+    leads=LEADS,
+    values=VALUES,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
 @click.option(
     "--depth",
-    type=float,
+    type=metres,
     metavar="METRES",
     shell_complete=depths,
     help="Metres of water above the muons (see --list).",
@@ -42,11 +90,11 @@ FILE = click.Path(path_type=Path)
 @click.option("-n", "--number", type=muon_number, metavar="NUMBER", help="How many muons: 1e7, 10_000_000.")
 @click.option(
     "--live-time",
-    type=positive_number,
+    type=seconds,
     metavar="SECONDS",
     help="Instead of -n: the muons that cross --area in this time, a Poisson number at the model's rate.",
 )
-@click.option("--area", type=positive_number, metavar="M2", help="The horizontal area for --live-time.")
+@click.option("--area", type=square_metres, metavar="M2", help="The horizontal area for --live-time.")
 @click.option("-o", "--output", type=FILE, metavar="FILE", help="The HDF5 file to be written.")
 @click.option("--overwrite", is_flag=True, help="Replace an existing file, once the new one is complete.")
 @click.option("--seed", type=seed_number, metavar="SEED", help="0 to 2^64 - 1; a new one if left out.")
@@ -63,7 +111,12 @@ FILE = click.Path(path_type=Path)
     shell_complete=devices,
     help="cpu, cuda, or auto (the default): cuda if it can be had.",
 )
-@click.option("--threads", type=int, help="Computing side by side; if left out, as many as may be used.")
+@click.option(
+    "--threads",
+    type=thread_number,
+    metavar="NUMBER",
+    help="Computing side by side; if left out, as many as may be used.",
+)
 @click.option("-q", "--quiet", is_flag=True, help="No progress bar and no closing line.")
 @click.option("--list", "list_only", is_flag=True, help="List the released models.")
 @click.version_option(package_name="deepmuon-runtime", prog_name=NAME, message="%(prog)s %(version)s")
@@ -120,6 +173,7 @@ def gen(
         _print_models()
         return
     _check_model_options(depth, architecture, model)
+    _check_released(depth, architecture)
     _check_number_options(number, live_time, area)
     if shard is not None and seed is None:
         raise click.UsageError("--shard needs a --seed, the same for all shards: without it each would have its own")
@@ -130,7 +184,7 @@ def gen(
     from deepmuon_runtime.files.output import check_output
     from deepmuon_runtime.latents.shard import WHOLE_RUN
 
-    check_output(output, overwrite)
+    check_output(output, overwrite, [] if model is None else [model])
     generator = Generator.open(depth, architecture, file=model, device=device, threads=threads)
     seed = new_seed() if seed is None else seed
     attributes = {}
@@ -160,6 +214,14 @@ def _check_model_options(depth: float | None, architecture: str | None, model: P
         raise click.UsageError("--model goes without --depth and --architecture: the file has its own")
 
 
+def _check_released(depth: float | None, architecture: str | None) -> None:
+    """Refuse a depth that there is not before anything else is asked for."""
+    from deepmuon_runtime.model.released import released_model
+
+    if depth is not None:
+        released_model(depth, architecture)
+
+
 def _check_number_options(number: int | None, live_time: float | None, area: float | None) -> None:
     if (live_time is None) != (area is None):
         raise click.UsageError("--live-time and --area go together")
@@ -186,12 +248,31 @@ def _print_models() -> None:
 
 @contextmanager
 def _progress(number: int, hidden: bool) -> Iterator[Callable[[int], object] | None]:
-    """Show a bar on stderr, if that is a terminal."""
-    if hidden or not sys.stderr.isatty():
+    """Show a bar on stderr; where that is no terminal, a line every half minute."""
+    if hidden:
         yield None
+        return
+    if not sys.stderr.isatty():
+        yield _Lines(number).update
         return
     with click.progressbar(length=number, file=sys.stderr, update_min_steps=max(1, number // 200)) as bar:
         yield bar.update
+
+
+class _Lines:
+    """Tells a log how many muons there are, every half minute."""
+
+    def __init__(self, number: int) -> None:
+        self._number = number
+        self._done = 0
+        self._told = time.monotonic()
+
+    def update(self, muons: int) -> None:
+        """Count so many muons more."""
+        self._done += muons
+        if time.monotonic() - self._told >= BETWEEN_LINES:
+            self._told += BETWEEN_LINES
+            click.echo(f"{NAME}: {self._done:,} of {self._number:,} muons", err=True)
 
 
 def _closing_line(output: Path, number: int, seconds: float, generator: Generator, seed: int) -> str:

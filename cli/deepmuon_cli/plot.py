@@ -38,7 +38,7 @@ def plot(files: tuple[Path, ...], output: Path, overwrite: bool) -> None:
     from deepmuon_runtime.files.whole import whole_file
     from deepmuon_runtime.views.spectra import count_spectra
 
-    check_output(output, overwrite)
+    check_output(output, overwrite, files)
     form = output.suffix.lstrip(".").lower()
     if form not in ("png", "pdf", "svg"):
         raise RefusedError(f"{output} is no name of a picture: it should end with .png, .pdf or .svg")

@@ -9,11 +9,13 @@
 
 The pattern is relative to the page. A file begins with its title; with ``section`` the title stays and of what
 follows only the section with that heading. With ``pictures``, after NAME.md come those in that folder's NAME/.
-No match is no error.
+Pictures that a file shows itself are found beside it. No match is no error.
 """
 
 from __future__ import annotations
 
+import os
+import re
 from pathlib import Path
 from typing import ClassVar
 
@@ -24,6 +26,8 @@ from sphinx.util.docutils import SphinxDirective
 from sphinx.util.typing import ExtensionMetadata
 
 __all__ = ["setup"]
+
+PICTURE = re.compile(r"(!\[[^]]*\]\()([\w./-]+\.(?:png|svg)\))")
 
 
 class IncludeAll(SphinxDirective):
@@ -38,7 +42,9 @@ class IncludeAll(SphinxDirective):
         found: list[nodes.Node] = []
         for file in sorted(folder.glob(self.arguments[0])):
             self.env.note_dependency(str(file))
-            text = "\n\n".join([self.text(file), *self.pictures(folder, file.stem)])
+            beside = Path(os.path.relpath(file.parent, folder)).as_posix()
+            shown = PICTURE.sub(rf"\g<1>{beside}/\g<2>", self.text(file))
+            text = "\n\n".join([shown, *self.pictures(folder, file.stem)])
             found += self.parse_text_to_nodes(text, allow_section_headings=True)
         return found
 

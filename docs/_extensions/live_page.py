@@ -28,6 +28,8 @@ MODEL_FIELDS = (
     "name",
     "sha256",
     "architecture",
+    "flux",
+    "medium",
     "depth_m",
     "muons_per_draw",
     "latent_size",

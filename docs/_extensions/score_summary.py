@@ -18,13 +18,18 @@ from sphinx.util.docutils import SphinxDirective
 from sphinx.util.typing import ExtensionMetadata
 
 from deepmuon_training.scores.evaluation import Evaluation
-from deepmuon_training.scores.scorecard import Score, scorecard
+from deepmuon_training.scores.score import Score
+from deepmuon_training.scores.scorecard import scorecard
 
 __all__ = ["setup"]
 
 COLUMNS = {
     "KS energy": "KS energy",
     "KS cos zenith": "KS cos zenith",
+    "cos θ < 0.05": "cos zenith 0 to",
+    "0.05 to 0.1": "cos zenith 0.05",
+    "0.1 to 0.15": "cos zenith 0.1 to",
+    "0.15 to 0.2": "cos zenith 0.15",
     "delta": "cells: delta",
     "worst bin": "energy bin",
     "charge χ²/ndf": "charge by cell",
@@ -42,7 +47,7 @@ class ScoreSummary(SphinxDirective):
         """Make the table."""
         folder = Path(self.env.doc2path(self.env.docname)).parent / self.arguments[0]
         files = sorted(folder.glob("*.json"), key=_architecture_and_depth)
-        head = ["model", *COLUMNS, "met"]
+        head = ["model", *COLUMNS, "met", "missed", "too few"]
         lines = [head, ["---", *["--:"] * (len(head) - 1)], *(_row(file) for file in files)]
         for file in files:
             self.env.note_dependency(str(file))
@@ -56,9 +61,10 @@ def _architecture_and_depth(file: Path) -> tuple[str, int]:
 
 def _row(file: Path) -> list[str]:
     scores = scorecard(Evaluation.from_json(file.read_text(encoding="utf-8")), _architecture_and_depth(file)[0])
-    judged = [score.met for score in scores if score.met is not None]
+    verdicts = [score.verdict for score in scores]
+    counts = [str(verdicts.count(verdict)) for verdict in ("met", "missed", "too few muons to tell")]
     values = [_value(scores, name) for name in COLUMNS.values()]
-    return [file.stem.replace("-", " "), *values, f"{sum(judged)}/{len(judged)}"]
+    return [file.stem.replace("-", " "), *values, *counts]
 
 
 def _value(scores: tuple[Score, ...], beginning: str) -> str:

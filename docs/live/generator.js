@@ -1,7 +1,7 @@
 /** A model, ready to give muons. Runs in the worker. */
 
 import { fetchFile } from "./fetch_file.js";
-import { Latents } from "./latents.js";
+import { Latents, modelStream } from "./latents.js";
 
 const ENGINE = new URL("engine/", import.meta.url);
 const MODELS = new URL("models/", import.meta.url);
@@ -18,6 +18,7 @@ export class Generator {
         this.ort = ort;
         this.session = session;
         this.latents = latents;
+        this.stream = modelStream(model);
     }
 
     /**
@@ -48,7 +49,7 @@ export class Generator {
     async sample(seed, first, count) {
         const { name, latent_size, muons_per_draw } = this.model;
         const draws = Math.ceil(count / muons_per_draw);
-        const latent = this.latents.draw(seed, first / muons_per_draw, draws, latent_size);
+        const latent = this.latents.draw(seed, this.stream, first / muons_per_draw, draws, latent_size);
         try {
             const made = await this.session.run({
                 latent: new this.ort.Tensor("float32", latent, [draws, latent_size]),

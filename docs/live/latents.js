@@ -3,7 +3,7 @@
  *
  * @typedef {object} RandomModule
  * @property {WebAssembly.Memory} memory
- * @property {(blocks: number, seed: bigint, firstBlock: bigint) => void} fill_latents
+ * @property {(blocks: number, seed: bigint, stream: bigint, firstBlock: bigint) => void} fill_latents
  */
 
 const LARGEST_SEED = 2n ** 64n - 1n;
@@ -32,6 +32,20 @@ export function readSeed(text) {
     return BigInt(digits);
 }
 
+/**
+ * The stream of a model's random numbers: the FNV-1a hash of what it says of itself, 0 to 2^64 - 1.
+ *
+ * @param {{architecture: string, flux: string, medium: string, depth_m: number}} model
+ */
+export function modelStream({ architecture, flux, medium, depth_m }) {
+    const depth = new Uint8Array(4);
+    new DataView(depth.buffer).setFloat32(0, depth_m, true);
+    const text = new TextEncoder().encode(`${architecture}/${flux}/${medium}/0/`);
+    let stream = 0xcbf29ce484222325n;
+    for (const byte of [...text, ...depth]) stream = BigInt.asUintN(64, (stream ^ BigInt(byte)) * 0x100000001b3n);
+    return stream;
+}
+
 export class Latents {
     /** @param {RandomModule} module */
     constructor(module) {
@@ -50,16 +64,18 @@ export class Latents {
      * The latents of consecutive draws: independent, uniform, strictly inside (-1, 1). They last until the next call.
      *
      * @param {bigint} seed 0 to 2^64 - 1
+     * @param {bigint} stream as `modelStream` gives it
      * @param {number} first of the draws, a multiple of `DRAWS_STEP`
      * @param {number} draws
      * @param {number} latentSize
      */
-    draw(seed, first, draws, latentSize) {
+    draw(seed, stream, first, draws, latentSize) {
         const { memory, fill_latents } = this.module;
         const blocks = Math.ceil((draws * latentSize) / BLOCK);
         const missing = blocks * BLOCK * Float32Array.BYTES_PER_ELEMENT - memory.buffer.byteLength;
         if (missing > 0) memory.grow(Math.ceil(missing / PAGE));
-        fill_latents(blocks, BigInt.asIntN(64, seed), BigInt((first / BLOCK) * latentSize));
+        const firstBlock = BigInt((first / BLOCK) * latentSize);
+        fill_latents(blocks, BigInt.asIntN(64, seed), BigInt.asIntN(64, stream), firstBlock);
         return new Float32Array(memory.buffer, 0, draws * latentSize);
     }
 }

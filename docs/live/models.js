@@ -5,6 +5,8 @@
  * @property {string} name of the file
  * @property {string} sha256
  * @property {string} architecture
+ * @property {string} flux
+ * @property {string} medium
  * @property {number} depth_m
  * @property {number} muons_per_draw
  * @property {number} latent_size

@@ -47,17 +47,20 @@ function units(number, [unit, size]) {
 }
 
 /**
- * The number that a reader typed: 1000000, 1e6, 1,000,000 or 1_000_000.
+ * The number that a reader typed: 1000000, 1e6, 1M, 1,000,000 or 1_000_000. A comma is none of decimals: 1,5 is refused.
  *
  * @param {string} text
  * @param {number} largest
  * @throws {RangeError} in words, if it is no number of muons
  */
 export function readNumber(text, largest) {
-    const digits = text.replace(/[\s,_]/g, "");
-    const number = digits === "" ? Number.NaN : Number(digits);
+    const [, digits, letter] = /** @type {RegExpExecArray} */ (/^(.*?)\s*([kM]?)$/s.exec(text.trim()));
+    const grouped = /^\d{1,3}([\s,_]\d{3})+$/.test(digits);
+    const plain = /^\d+(\.\d+)?(e\+?\d+)?$/i.test(digits);
+    const typed = grouped || plain ? Number(digits.replace(/[\s,_]/g, "")) : Number.NaN;
+    const number = Number((typed * (letter === "M" ? 1e6 : letter === "k" ? 1e3 : 1)).toPrecision(15));
     if (!Number.isInteger(number) || number < 1) {
-        throw new RangeError("How many muons? A whole number, such as 1000000 or 1e6.");
+        throw new RangeError("How many muons? A whole number, such as 1000000, 1,000,000, 1e6 or 1M.");
     }
     if (number > largest) {
         throw new RangeError(`This page keeps ${count(largest)} muons at most; deepmuon-gen writes any number.`);

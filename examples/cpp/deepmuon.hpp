@@ -1,8 +1,10 @@
 // Cosmic-ray muons from a DeepMuon model, in C++17; header only.
 //
 //     deepmuon::Generator generator("quantile-10m.onnx");
-//     std::mt19937_64 random(1);
+//     deepmuon::Philox random = generator.random(1);
 //     for (const deepmuon::Muon& muon : generator.sample(1000, random)) { ... }
+//
+// These are the muons of `deepmuon-gen --seed 1`. Any other source of 32 random bits will do, such as a std::mt19937.
 //
 // OpenVINO runs the model where DEEPMUON_OPENVINO is defined, else ONNX Runtime. Errors are exceptions: what the engine
 // throws, which is a std::exception, or std::runtime_error if the file is no DeepMuon model.
@@ -13,12 +15,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
-#include <random>
+#include <locale>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "muon.hpp"
+#include "philox.hpp"
+#include "stream.hpp"
 #ifdef DEEPMUON_OPENVINO
 #include "engine_openvino.hpp"
 #else
@@ -27,11 +32,10 @@
 
 namespace deepmuon {
 
-// A latent from 64 random bits, uniform and strictly inside (-1, 1): with s the upper 24 bits as a whole number, it is
-// (2 s + 1) / 2^24 - 1, an odd multiple of 2^-24, which float holds exactly.
-inline float latent(std::uint64_t bits) {
-    const auto s = static_cast<std::int32_t>(bits >> 40);
-    return static_cast<float>(2 * s + 1 - (1 << 24)) / (1 << 24);
+// A latent from 32 random bits, uniform and strictly inside (-1, 1): with s their upper 24 as a signed number, it is
+// (2 s + 1) / 2^24, which float holds exactly.
+inline float latent(std::uint32_t bits) {
+    return static_cast<float>(2 * (static_cast<std::int32_t>(bits) >> 8) + 1) / (1 << 24);
 }
 
 class Generator {
@@ -54,7 +58,21 @@ public:
         return found->second;
     }
 
-    // Muons from random bits: random() gives 64 of them, such as a std::mt19937_64.
+    // The random numbers that deepmuon-gen takes for this model and a seed. To begin at another draw than the first,
+    // leave out those before it: random.discard(draw * latent_size()).
+    Philox random(std::uint64_t seed) const {
+        const auto found = metadata_.find("deepmuon.flux");
+        const std::string flux = found != metadata_.end() ? found->second : creator(metadata("created_by"));
+        double depth = 0;
+        std::istringstream text(metadata("depth_m"));
+        text.imbue(std::locale::classic());
+        text >> depth;
+        return {seed, model_stream(metadata("architecture"), flux, metadata("medium"), static_cast<float>(depth))};
+    }
+
+    std::size_t latent_size() const { return latent_size_; }
+
+    // Muons from random bits: random() gives 32 of them, such as a Philox or a std::mt19937.
     template <class Random> std::vector<Muon> sample(std::size_t count, Random&& random) {
         std::vector<Muon> muons;
         muons.reserve(count);
@@ -62,7 +80,7 @@ public:
             const std::size_t missing = count - muons.size();
             const std::size_t draws = std::min((missing - 1) / muons_per_draw_ + 1, 1 + largest_run / muons_per_draw_);
             std::vector<float> latents(draws * latent_size_);
-            std::generate(latents.begin(), latents.end(), [&] { return latent(random()); });
+            std::generate(latents.begin(), latents.end(), [&] { return latent(static_cast<std::uint32_t>(random())); });
             const std::vector<Muon> made = run(latents);
             muons.insert(muons.end(), made.begin(), made.begin() + std::min(made.size(), missing));
         }

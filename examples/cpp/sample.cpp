@@ -1,10 +1,9 @@
-// deepmuon-sample MODEL N SEED: writes N muons as CSV; what the model says of itself goes to the standard error.
+// deepmuon-sample MODEL N SEED: writes N muons as CSV, those of deepmuon-gen; what the model says of itself goes to the standard error.
 
 #include <charconv>
 #include <cstdint>
 #include <cstdio>
 #include <exception>
-#include <random>
 #include <stdexcept>
 #include <string>
 
@@ -29,12 +28,12 @@ int main(int argc, char** argv) try {
         return 2;
     }
     const std::uint64_t count = whole_number(argv[2]);
-    std::mt19937_64 random(whole_number(argv[3]));
+    const std::uint64_t seed = whole_number(argv[3]);
     deepmuon::Generator generator(argv[1]);
     std::fprintf(stderr, "%s, %s m of %s\n", generator.metadata("architecture").c_str(),
                  generator.metadata("depth_m").c_str(), generator.metadata("medium").c_str());
     std::printf("kinetic_energy,u,v,w,pdg_id\n");
-    for (const deepmuon::Muon& muon : generator.sample(count, random)) {
+    for (const deepmuon::Muon& muon : generator.sample(count, generator.random(seed))) {
         std::printf("%.9g,%.9g,%.9g,%.9g,%d\n", muon.kinetic_energy, muon.u, muon.v, muon.w, muon.pdg_id());
     }
     return 0;

@@ -23,7 +23,7 @@ public:
 
     // All randomness is Geant4's: an event that is run again with its seeds has its muon again.
     void GeneratePrimaries(G4Event* event) override {
-        const auto random = [] { return static_cast<std::uint64_t>(G4UniformRand() * 0x1p64); };
+        const auto random = [] { return static_cast<std::uint32_t>(G4UniformRand() * 0x1p32); };
         const deepmuon::Muon muon = generator_.sample(1, random).front();
         if (muon.charge > 0) {
             gun_.SetParticleDefinition(G4MuonPlus::Definition());

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 
 __all__ = ["DeepMuonError", "FailedError", "RefusedError", "first_line", "reason"]
@@ -28,5 +29,18 @@ def first_line(error: Exception) -> str:
 def reason(error: BaseException) -> str:
     """Return the cause of an error in one line."""
     if isinstance(error, OSError) and error.errno:
-        return os.strerror(error.errno)
+        return _of_lock(error.errno) if "unable to lock file" in str(error) else os.strerror(error.errno)
     return " ".join(str(error).split()) or type(error).__name__
+
+
+def _of_lock(number: int) -> str:
+    """Return why HDF5 could not lock a file, and when it may be read without a lock."""
+    if number in (errno.EAGAIN, errno.EACCES):
+        return (
+            "another program has it open for writing; close it there, or set HDF5_USE_FILE_LOCKING=FALSE if that "
+            "program writes no more"
+        )
+    return (
+        f"it can't be locked ({os.strerror(number)}); set HDF5_USE_FILE_LOCKING=FALSE, which is safe where no program "
+        "writes to the file"
+    )

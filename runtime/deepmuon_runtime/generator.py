@@ -12,6 +12,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from itertools import chain, pairwise
+from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,7 +56,7 @@ class Generator:
     Muon number i of a seed is the same whatever the number of muons, threads and chunks: bit by bit on one
     type of CPU, and to float32 rounding between types of CPU, or CPU and CUDA. So a shorter run is the
     beginning of a longer one. To that end the model always runs on whole blocks of draws that begin at
-    multiples of their size.
+    multiples of their size. Two models have nothing in common at one seed: each has a stream of its own.
 
     Attributes
     ----------
@@ -79,6 +80,7 @@ class Generator:
         self.device = device
         self.threads = threads
         self._session = session
+        self._stream = model.stream
         self._block_draws = _block_draws(model, device)
         self._own = threading.local()  # each thread's memory for its runs
 
@@ -117,8 +119,8 @@ class Generator:
         from deepmuon_runtime.model.onnx_file import check_onnx_file
 
         threads = _usable_processors() if threads is None else threads
-        if threads < 1:
-            raise RefusedError(f"{threads} threads can't make muons: 1 or more can")
+        if not isinstance(threads, Integral) or threads < 1:
+            raise RefusedError(f"{threads!r} threads can't make muons: 1 or more can")
         if file is None:
             if depth is None:
                 raise RefusedError("which model? Give the depth of a released one, or the file of another")
@@ -256,7 +258,7 @@ class Generator:
         area
             Square metres.
         seed
-            0 to 2^64 - 1; the number has a stream of its own, apart from the muons of that seed.
+            0 to 2^64 - 1; the number has random numbers of its own, apart from the muons of that seed.
 
         Raises
         ------
@@ -265,12 +267,15 @@ class Generator:
         """
         if self.model.rate_hz_per_m2 is None:
             raise RefusedError(f"{self.model.name} does not know its rate: give a number of muons")
+        for number, meaning in ((live_time, "live time in seconds"), (area, "area in m2")):
+            if not isinstance(number, Real):
+                raise RefusedError(f"{number!r} is no {meaning}: a number is")
         mean = self.model.rate_hz_per_m2 * live_time * area
         if not 0 < mean <= LARGEST_NUMBER:
             raise RefusedError(
                 f"{mean:g} muons are expected in {live_time:g} s on {area:g} m2, and should be 0 to 2^53"
             )
-        return poisson(mean, checked_seed(seed))
+        return poisson(mean, checked_seed(seed), self._stream)
 
     def _attributes(self, seed: int, shard: Shard, total: int) -> dict[str, object]:
         model = self.model
@@ -308,7 +313,7 @@ class Generator:
         while done < len(muons):
             block, skipped = divmod(first + done, size)
             part = muons[done : done + size - skipped]
-            fill_latents(run.latent, seed, block * self._block_draws)
+            fill_latents(run.latent, seed, block * self._block_draws, self._stream)
             self._run(run, skipped, part)
             check_physical(part, self.model.energy_min_gev, self.model.energy_max_gev, first + done)
             done += len(part)
@@ -394,8 +399,8 @@ def _usable_processors() -> int:
 def checked_numbers(n: float, first: float = 0) -> range:
     """Return the numbers of n muons from `first` on, or raise RefusedError where there are none."""
     for number, meaning in ((n, "number of muons"), (first, "number of a first muon")):
-        if not (0 <= number <= LARGEST_NUMBER and number == int(number)):
-            raise RefusedError(f"{number} is no {meaning}: a whole number from 0 to 2^53 is")
+        if not isinstance(number, Real) or not 0 <= number <= LARGEST_NUMBER or number % 1 != 0:
+            raise RefusedError(f"{number!r} is no {meaning}: a whole number from 0 to 2^53 is")
     if first + n > LARGEST_NUMBER:
         raise RefusedError(f"{n} muons from number {first} on end after number 2^53")
     return range(int(first), int(first) + int(n))

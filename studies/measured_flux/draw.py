@@ -14,10 +14,11 @@ from deepmuon_training.fluxes.flux import MUON_MASS, Intensity
 from deepmuon_training.fluxes.gccly import gccly
 from deepmuon_training.reports.pictures import STYLE
 from studies.measured_flux.data import BESS_COSINE, L3, Bess, read_bess, read_l3
+from studies.shared.report import COLOURS
 
 __all__ = ["draw_fit", "draw_shape"]
 
-BLUE, RED, GREEN, BROWN = "#1f4e9e", "#c1272d", "#3a7d44", "#8a5a00"
+BLUE, RED, GREEN, BROWN, *_, GREY = COLOURS
 
 Float = NDArray[np.float64]
 
@@ -89,7 +90,7 @@ def draw_shape(flux: Intensity) -> Figure:
     with rc_context(STYLE):
         figure = Figure(figsize=(9, 3.8), layout="constrained")
         angles, slow = figure.subplots(1, 2)
-        for energy, colour in ((0.1, "#444444"), (1.0, BLUE), (10.0, GREEN), (100.0, BROWN), (1000.0, RED)):
+        for energy, colour in ((0.1, GREY), (1.0, BLUE), (10.0, GREEN), (100.0, BROWN), (1000.0, RED)):
             for one, style in ((flux, "-"), (gccly().intensity, ":")):
                 shape = np.add(*one(np.asarray(energy), cosine)) / np.add(*one(np.asarray(energy), np.asarray(1.0)))
                 label = f"{energy:g} GeV" if style == "-" else None

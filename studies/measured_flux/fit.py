@@ -26,6 +26,7 @@ from studies.measured_flux.data import Bess, read_bess, read_l3
 from studies.measured_flux.draw import draw_fit, draw_shape
 from studies.measured_flux.rates import rate_rows, rates
 from studies.measured_flux.smoothness import smoothness
+from studies.shared.report import table, write
 
 START = Parameters(0.7, 2.65, 300.0, 3e-3, 0.55, 3.0, 4.0)
 
@@ -212,12 +213,6 @@ def parameter_rows(best: Fit) -> list[tuple[str, ...]]:
     return [("fitted", "value", "error"), *((name, f"{value:.5g}", f"{error:.2g}") for name, value, error in values)]
 
 
-def _table(rows: list[tuple[str, ...]]) -> str:
-    """Return a table in Markdown, whose first row is its head."""
-    head, *body = rows
-    return "".join(f"| {' | '.join(row)} |\n" for row in (head, ("---", *["--:"] * (len(head) - 1)), *body))
-
-
 @click.command(help=__doc__)
 @click.option(
     "--compare",
@@ -250,12 +245,10 @@ def main(compare: Path | None) -> None:
         "rates": [rate._asdict() for rate in integrated],
     }
     here = Path(__file__)
-    here.with_suffix(".json").write_text(json.dumps(numbers, indent=1) + "\n", encoding="utf-8")
     head = ("what", "asked", "found")
-    here.with_suffix(".md").write_text(_table([head, *((s.what, s.asked, s.found) for s in found)]), encoding="utf-8")
-    here.with_name("parameters.md").write_text(_table(parameter_rows(best)), encoding="utf-8")
-    here.with_name("rates.md").write_text(_table(rate_rows(integrated)), encoding="utf-8")
-    draw_fit(flux).savefig(here.with_suffix(".png"), dpi=110)
+    write(here, numbers, [head, *((s.what, s.asked, s.found) for s in found)], draw_fit(flux))
+    here.with_name("parameters.md").write_text(table(parameter_rows(best)), encoding="utf-8")
+    here.with_name("rates.md").write_text(table(rate_rows(integrated)), encoding="utf-8")
     draw_shape(flux).savefig(here.with_name("shape.png"), dpi=110)
     if compare is not None:
         other = read_flux_table(compare)

@@ -427,3 +427,22 @@ def test_random_bytes_never_end_the_check_by_a_signal_or_without_end(endings, go
     assert found.keys() <= {0, 2, 3}
     assert found[2] > 0
     assert found[3] > 50
+
+
+@pytest.mark.parametrize("command", ["check", "csv", "merge", "plot"])
+def test_a_file_that_another_program_writes_is_refused_with_the_way_on(tmp_path, model_file, command):
+    Generator.open(file=model_file).write(tmp_path / "muons.h5", 10, seed=1)
+    output = [] if command == "check" else ["-o", {"csv": "a.csv", "merge": "a.h5", "plot": "a.png"}[command]]
+    asked = [Path(sysconfig.get_path("scripts")) / f"deepmuon-{command}", "muons.h5", *output]
+    with h5py.File(tmp_path / "muons.h5", "r+"):
+        done = subprocess.run(asked, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+        forced = subprocess.run(
+            asked, cwd=tmp_path, timeout=120, env={**os.environ, "HDF5_USE_FILE_LOCKING": "FALSE"}, check=False
+        )
+    assert done.returncode == 2
+    assert done.stderr.endswith(
+        "another program has it open for writing; close it there, or set HDF5_USE_FILE_LOCKING=FALSE if that program "
+        "writes no more\n"
+    )
+    assert done.stderr.count("\n") == 1
+    assert forced.returncode == 0

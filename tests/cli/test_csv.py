@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import subprocess
 import sysconfig
 from pathlib import Path
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 from support.worked_example import run_example
 
-from deepmuon_runtime import Generator, Muons, read_muons, write_muons
+from deepmuon_runtime import Generator, Muons, read_attributes, read_muons, write_muons
 
 COMMAND = Path(sysconfig.get_path("scripts")) / "deepmuon-csv"
 MUONS = 70_001
@@ -27,22 +28,30 @@ def csv(tmp_path, model_file):
 
 
 def columns(text: str) -> np.ndarray:
-    return np.array([line.split(",") for line in text.splitlines()], dtype=np.float32).T
+    lines = [line for line in text.splitlines() if line[0] not in "#k"]
+    return np.array([line.split(",") for line in lines], dtype=np.float32).T
 
 
 def test_the_example_prints_what_its_help_says(tmp_path):
     shown, printed = run_example(tmp_path, "deepmuon-csv")
     assert printed == shown
-    assert shown.count("$ ") == 4
+    assert shown.count("$ ") == 5
 
 
 def test_every_muon_is_there_to_the_last_bit(csv, tmp_path):
     assert csv("muons.h5", "-o", "muons.csv") == (0, "", "")
-    header, rows = (tmp_path / "muons.csv").read_text(encoding="ascii").split("\n", 1)
-    assert header == "kinetic_energy_GeV,u,v,w,pdg_id"
+    text = (tmp_path / "muons.csv").read_text(encoding="ascii")
+    assert "\nkinetic_energy_GeV,u,v,w,pdg_id\n" in text
     muons = read_muons(tmp_path / "muons.h5")
-    for name, found in zip(("kinetic_energy", "u", "v", "w", "pdg_id"), columns(rows), strict=True):
+    for name, found in zip(("kinetic_energy", "u", "v", "w", "pdg_id"), columns(text), strict=True):
         np.testing.assert_array_equal(found, getattr(muons, name))
+
+
+def test_comments_say_what_the_file_says(csv, tmp_path):
+    comments = [line for line in csv("muons.h5", "-o", "-")[1].splitlines() if line.startswith("#")]
+    said = dict(line.removeprefix("# ").split(" = ", 1) for line in comments)
+    expected = {"format": "deepmuon-muons", **read_attributes(tmp_path / "muons.h5")}
+    assert {name: json.loads(value) for name, value in said.items()} == expected
 
 
 def test_units_and_header_are_as_asked_for(csv):
@@ -52,14 +61,50 @@ def test_units_and_header_are_as_asked_for(csv):
     np.testing.assert_array_equal(columns(mev)[1:], columns(gev)[1:])
 
 
+def phits(text: str) -> np.ndarray:
+    return np.array([line.split(" ") for line in text.splitlines()], dtype=float).T
+
+
+def test_a_list_for_phits_has_its_ten_columns(csv, tmp_path):
+    code, text, err = csv("muons.h5", "--phits", "4", "--seed", "7", "-o", "-")
+    assert (code, err) == (0, "")
+    code, x, y, z, u, v, w, energy, weight, time = phits(text)
+    muons = read_muons(tmp_path / "muons.h5")
+    np.testing.assert_array_equal(code, muons.pdg_id)
+    np.testing.assert_allclose(energy, 1e3 * muons.kinetic_energy.astype(float), rtol=1e-8)
+    np.testing.assert_allclose([u, v, w], [muons.u, muons.v, muons.w], atol=2e-7)
+    np.testing.assert_allclose(u**2 + v**2 + w**2, 1, rtol=0, atol=1e-15)
+    assert (np.abs([x, y]) < 200).all()
+    # Means, and the correlation of x and y, within 5 standard deviations: 2e-6 false alarms.
+    assert np.abs(np.mean([x, y], axis=1)).max() < 5 * 400 / np.sqrt(12 * MUONS)
+    assert abs(np.corrcoef(x, y)[0, 1]) < 5 / np.sqrt(MUONS)
+    assert len(np.unique(x)) > 0.99 * MUONS
+    assert {*z, *time} == {0.0}
+    assert {*weight} == {1.0}
+
+
+def test_the_places_for_phits_are_those_of_the_seed(csv):
+    asked = ("muons.h5", "--phits", "4", "-o", "-")
+    one, again, other = (csv(*asked, "--seed", seed)[1] for seed in ("1", "1", "2"))
+    assert one == again
+    assert not np.any(phits(one)[1] == phits(other)[1])
+    assert csv(*asked)[1] != csv(*asked)[1]
+
+
+def test_a_list_for_phits_is_the_same_in_any_language(csv, tmp_path, monkeypatch):
+    monkeypatch.setenv("LC_ALL", "de_DE.UTF-8")
+    monkeypatch.setenv("LC_NUMERIC", "de_DE.UTF-8")
+    assert "," not in csv("muons.h5", "--phits", "1.5", "-o", "-")[1]
+
+
 def test_stdout_gets_what_a_file_gets(csv, tmp_path):
     csv("muons.h5", "-o", "muons.csv")
     assert csv("muons.h5", "-o", "-") == (0, (tmp_path / "muons.csv").read_text(encoding="ascii"), "")
 
 
-def test_a_reader_that_goes_is_told_in_one_line(csv, tmp_path):
+def test_a_reader_that_goes_ends_the_command_silently(csv, tmp_path):
     done = subprocess.run(
-        f"'{COMMAND}' muons.h5 -o - | head -n 1; exit ${{PIPESTATUS[0]}}",
+        f"'{COMMAND}' muons.h5 -o - | grep -m 1 kinetic; exit ${{PIPESTATUS[0]}}",
         shell=True,
         executable="/bin/bash",
         cwd=tmp_path,
@@ -67,13 +112,15 @@ def test_a_reader_that_goes_is_told_in_one_line(csv, tmp_path):
         text=True,
         timeout=120,
     )
-    assert (done.returncode, done.stdout) == (1, "kinetic_energy_GeV,u,v,w,pdg_id\n")
-    assert done.stderr == "deepmuon-csv: stdout was not written to its end: Broken pipe\n"
+    assert (done.returncode, done.stdout, done.stderr) == (141, "kinetic_energy_GeV,u,v,w,pdg_id\n", "")
 
 
 def test_a_file_of_no_muon_is_a_header(csv, tmp_path):
     write_muons(tmp_path / "none.h5", Muons.empty(0), {"depth_m": 0.0, "medium": "G4_WATER"})
-    assert csv("none.h5", "-o", "-") == (0, "kinetic_energy_GeV,u,v,w,pdg_id\n", "")
+    code, out, err = csv("none.h5", "-o", "-")
+    assert (code, err) == (0, "")
+    assert out.splitlines()[0] == '# format = "deepmuon-muons"'
+    assert out.splitlines()[-1] == "kinetic_energy_GeV,u,v,w,pdg_id"
 
 
 @pytest.mark.parametrize(
@@ -103,7 +150,7 @@ def test_an_existing_output_is_replaced_only_where_asked(csv, tmp_path):
     assert csv("muons.h5", "-o", "muons.csv")[0] == 2
     assert (tmp_path / "muons.csv").read_text() == "precious"
     assert csv("muons.h5", "-o", "muons.csv", "--overwrite") == (0, "", "")
-    assert (tmp_path / "muons.csv").read_text().count("\n") == MUONS + 1
+    assert columns((tmp_path / "muons.csv").read_text()).shape == (5, MUONS)
 
 
 def test_the_muon_file_itself_is_never_replaced(csv, tmp_path):
@@ -112,5 +159,5 @@ def test_the_muon_file_itself_is_never_replaced(csv, tmp_path):
     for output in ("muons.h5", "link.h5"):
         code, out, err = csv("muons.h5", "-o", output, "--overwrite")
         assert (code, out) == (2, "")
-        assert "is the muon file itself" in err
+        assert f"{output} is read here, and would be replaced" in err
     assert (tmp_path / "muons.h5").read_bytes() == before

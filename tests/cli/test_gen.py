@@ -60,6 +60,16 @@ def test_the_main_job_gives_the_muons_of_the_model_and_says_so(gen):
     assert attributes["live_time_s_m2"] == 1000 / 55.5
 
 
+@pytest.mark.usefixtures("released")
+def test_two_depths_of_a_seed_have_nothing_in_common(gen):
+    """The two models have the same graph; the correlation is within 4 standard deviations: 6e-5 false alarms."""
+    n = 20_000
+    for depth in (0, 10):
+        assert gen("--depth", depth, "-n", n, "--seed", 1, "-o", f"{depth}.h5")[0] == 0
+    energies = [np.log(read_muons(f"{depth}.h5").kinetic_energy) for depth in (0, 10)]
+    assert abs(np.corrcoef(energies)[0, 1]) < 4 / np.sqrt(n)
+
+
 def test_a_model_of_ones_own_is_taken_from_its_file(gen, model_file):
     assert gen("--model", model_file, "-n", 10, "-o", "muons.h5")[0] == 0
     assert len(read_muons("muons.h5")) == 10
@@ -228,7 +238,7 @@ GOOD = {"--depth": "10", "-n": "10", "-o": "muons.h5"}
         ({"-n": None, "--live-time": "10", "--area": "-1"}, "-1 is not a finite number above 0"),
         ({"-n": None, "--live-time": "nan", "--area": "1"}, "nan is not a finite number above 0"),
         ({"-n": None, "--live-time": "1e300", "--area": "1"}, "muons are expected"),
-        ({"-n": None, "--live-time": "long", "--area": "1"}, "long is no number"),
+        ({"-n": None, "--live-time": "long", "--area": "1"}, "long is no number of seconds"),
         ({"--seed": "-1"}, "-1 is not from 0 to 2^64 - 1"),
         ({"--seed": str(2**64)}, "is not from 0 to 2^64 - 1"),
         ({"--seed": "0.5"}, "0.5 is not a whole number"),
@@ -239,10 +249,10 @@ GOOD = {"--depth": "10", "-n": "10", "-o": "muons.h5"}
         ({"--shard": "1", "--seed": "1"}, "'1' is no shard: write for instance 1/4"),
         ({"--threads": "0"}, "0 threads can't make muons"),
         ({"--threads": "-2"}, "-2 threads can't make muons"),
-        ({"--threads": "two"}, "'two' is not a valid integer"),
+        ({"--threads": "two"}, "two is not a whole number"),
         ({"--depth": "12"}, "no quantile model for a depth of 12 m: there are 0 and 10 m"),
         ({"--depth": "nan"}, "there are 0 and 10 m"),
-        ({"--depth": "deep"}, "'deep' is not a valid float"),
+        ({"--depth": "deep"}, "deep is no number of metres"),
         ({"--depth": None}, "which muons? Give --depth METRES"),
         ({"--architecture": "flow"}, "there are quantile and transformer"),
         ({"--model": "model.onnx"}, "--model goes without --depth"),
@@ -334,6 +344,17 @@ def test_a_bar_shows_the_progress_on_a_terminal(model_file, tmp_path):
     os.close(terminal)
 
 
+def test_a_log_gets_a_line_of_progress_every_half_minute(gen, model_file, monkeypatch):
+    """A clock on which each look is 10 s after the one before."""
+    ticks = iter(range(0, 10**6, 10))
+    monkeypatch.setattr("deepmuon_cli.gen.time.monotonic", lambda: next(ticks))
+    code, _, err = gen("--model", model_file, "-n", "1.2e6", "-o", "muons.h5", "--seed", 1)
+    assert code == 0
+    lines = err.splitlines()
+    assert len(lines) == 3  # of ten pieces
+    assert all(re.fullmatch(r"deepmuon-gen: [\d,]+ of 1,200,000 muons", line) for line in lines)
+
+
 def test_a_warning_is_one_line(gen, model_file, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     for package in ("onnxruntime", "onnxruntime_gpu"):
@@ -352,7 +373,58 @@ def test_a_warning_is_one_line(gen, model_file, tmp_path, monkeypatch):
 
 
 def test_an_option_that_is_misspelt_is_told_with_the_nearest_one(gen):
-    assert gen("--dept", "10") == (2, "", "deepmuon-gen: No such option '--dept'. Did you mean '--depth'?\n")
+    assert gen("--dept", "10") == (2, "", "deepmuon-gen: there is no option --dept; did you mean --depth?\n")
+
+
+@pytest.mark.usefixtures("released")
+@pytest.mark.parametrize(
+    ("line", "answer"),
+    [
+        ("", "which muons? Give --depth METRES"),
+        ("10", "10 stands alone, without an option before it; did you mean --depth 10 or -n 10?"),
+        ("--depth 10 1e6", "did you mean -n 1e6?"),
+        ("--depth 10 -n 1e6 muons.h5", "did you mean -o muons.h5?"),
+        ("mine.onnx -n 10", "did you mean --model mine.onnx?"),
+        ("list", "did you mean --list?"),
+        ("--depth 15", "no quantile model for a depth of 15 m: there are 0 and 10 m"),
+        ("--depth 10m", "10m is no number of metres: write 10"),
+        ("--depth 1.5km", "write 1500"),
+        ("--depth 10,5", "write 10.5"),
+        ("--depth 1,000", "write 1000 or 1"),
+        ("--live-time 1h", "1h is no number of seconds: write 3600"),
+        ("--live-time 1.5min", "write 90"),
+        ("--live-time 2days", "write 172800"),
+        ("--live-time 1,5", "write 1.5"),
+        ("--area 4m2", "4m2 is no number of m2: write 4"),
+        ("--area 50cm²", "write 0.005"),
+        ("-n 10M", "10M is no number: write 1e7"),
+        ("-n 1,5k", "write 1500"),
+        ("-n 10,000", "write 10000"),
+        ("-n 1,234,567", "write 1234567"),
+        ("-n 1,5", "write for instance 1e7"),
+        ("-n 2.5", "2.5 is not a whole number: write 3"),
+        ("--seed 1e3", "write 1000"),
+        ("--seed 0x1F", "write 31"),
+        ("--threads 4.0", "write 4"),
+        ("--arch quantile", "there is no option --arch; did you mean --architecture?"),
+        ("--out muons.h5", "did you mean --output?"),
+        ("--Depth 10", "did you mean --depth?"),
+        ("--depht 10", "did you mean --depth?"),
+        ("--energy-min 1", "keep those you want when you read the file"),
+        ("--material G4_ROCK", "deepmuon-train transport takes their muons through other materials"),
+        ("--flux cry", "a model has its own"),
+        ("--format csv", "deepmuon-csv writes text"),
+        ("--gpu", "write --device cuda"),
+        ("--xyzzy", "deepmuon-gen --help lists"),
+    ],
+)
+def test_a_mistyped_call_gets_an_answer_that_leads_on(gen, line, answer):
+    code, out, err = gen(*line.split())
+    assert (code, out) == (2, "")
+    assert err.startswith("deepmuon-gen: ")
+    assert err.count("\n") == 1
+    assert answer in err
+    assert files() == []
 
 
 def test_messages_have_colours_on_a_terminal_only(tmp_path):

@@ -138,7 +138,7 @@ def test_a_shard_is_never_replaced_by_the_whole(merge, generator, tmp_path, opti
     before = (tmp_path / names[0]).read_bytes()
     code, out, err = merge(*options, *names, "-o", output(tmp_path / names[0]), "--overwrite")
     assert (code, out) == (2, "")
-    assert err.endswith(f"is the shard {names[0]}: choose another name for the output\n")
+    assert err.endswith("is read here, and would be replaced: give the output another name\n")
     assert (tmp_path / names[0]).read_bytes() == before
 
 

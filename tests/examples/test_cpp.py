@@ -12,7 +12,10 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
+import onnx
 import pytest
+
+from deepmuon_runtime import read_muons
 
 REPOSITORY = Path(__file__).parents[2]
 MODELS = REPOSITORY / "models" / "deepmuon_models"
@@ -76,7 +79,7 @@ def test_other_muons_are_seen(readme: tuple[Path, str], tmp_path: Path):
     assert subprocess.run([program, MODELS / "quantile-0m.onnx", right_vectors_of_another]).returncode == 1
 
 
-def sampled(folder: Path, model: str, count: int, seed: int) -> np.ndarray:
+def sampled(folder: Path, model: str | Path, count: int, seed: int) -> np.ndarray:
     command = [folder / "build" / "cpp" / "deepmuon-sample", MODELS / model, str(count), str(seed)]
     written = subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True).stdout
     header, *rows = csv.reader(written.splitlines())
@@ -99,6 +102,27 @@ def test_muons_by_seed_are_those_of_the_model(readme: tuple[Path, str], model: s
 
 
 @needs_openvino
+@pytest.mark.parametrize("model", ["quantile-10m.onnx", "transformer-0m.onnx"])
+@pytest.mark.parametrize("metadata", [{}, {"flux": "measured", "depth_m": "0.1"}, {"created_by": "Ein Programm 2.0"}])
+def test_a_seed_gives_the_muons_of_deepmuon_gen(readme: tuple[Path, str], tmp_path: Path, model: str, metadata: dict):
+    folder, _ = readme
+    content = onnx.load(MODELS / model)
+    texts = {entry.key: entry.value for entry in content.metadata_props}
+    texts |= {f"deepmuon.{key}": value for key, value in metadata.items()}
+    onnx.helper.set_model_props(content, texts)
+    path = tmp_path / "model.onnx"
+    onnx.save(content, path)
+    seed, count = 2**64 - 1, 20_000
+    gen = [sys.executable, "-m", "deepmuon_cli.gen", "--model", path, "-n", str(count), "--seed", str(seed), "-q"]
+    subprocess.run([*gen, "-o", tmp_path / "muons.h5"], check=True)
+    found, expected = sampled(folder, path, count, seed), read_muons(tmp_path / "muons.h5")
+    # A transformer's energies are those of its many sums in float32; a charge at its threshold is rounding's.
+    np.testing.assert_allclose(found[:, 0], expected.kinetic_energy, rtol=1e-4)
+    np.testing.assert_allclose(found[:, 1:4], np.transpose([expected.u, expected.v, expected.w]), atol=1e-5)
+    assert np.sum(found[:, 4] != expected.pdg_id) <= 2
+
+
+@needs_openvino
 def test_the_readme_shows_what_its_last_command_writes(readme: tuple[Path, str]):
     _, written = readme
     shown = np.array([row.split(",") for row in blocks(README, "text")[0].splitlines()[1:]], dtype=float)
@@ -117,8 +141,6 @@ def test_the_readme_shows_what_its_last_command_writes(readme: tuple[Path, str])
     ],
 )
 def test_what_is_wrong_is_said(readme: tuple[Path, str], tmp_path: Path, arguments: list[str], message: str):
-    import onnx
-
     foreign = onnx.load(MODELS / "quantile-0m.onnx")
     del foreign.metadata_props[:]
     onnx.save(foreign, tmp_path / "foreign.onnx")

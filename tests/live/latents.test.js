@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import { test } from "node:test";
-import { Latents, newSeed, readSeed } from "../../docs/live/latents.js";
+import { Latents, modelStream, newSeed, readSeed } from "../../docs/live/latents.js";
 
 const bytes = await readFile(new URL("../../docs/live/engine/random.wasm", import.meta.url));
 const latents = await Latents.open(bytes);
@@ -16,7 +16,7 @@ test("Philox gives the known answers of Random123", () => {
 });
 
 test("latents are odd multiples of 2^-24 inside (-1, 1), and look uniform", () => {
-    const drawn = latents.draw(2n ** 64n - 1n, 0, 80_000, 5);
+    const drawn = latents.draw(2n ** 64n - 1n, 2n ** 64n - 1n, 0, 80_000, 5);
     let [sum, squares] = [0, 0];
     for (const latent of drawn) {
         assert.ok(Math.abs(latent) < 1 && Math.abs((latent * 2 ** 24) % 2) === 1);
@@ -29,13 +29,23 @@ test("latents are odd multiples of 2^-24 inside (-1, 1), and look uniform", () =
 });
 
 test("a draw has the same latents wherever the batch begins", () => {
-    const long = latents.draw(7n, 0, 64, 356).slice();
-    assert.deepEqual(latents.draw(7n, 24, 40, 356).slice(), long.slice(24 * 356));
+    const long = latents.draw(7n, 5n, 0, 64, 356).slice();
+    assert.deepEqual(latents.draw(7n, 5n, 24, 40, 356).slice(), long.slice(24 * 356));
 });
 
-test("seeds differ in every bit of theirs", () => {
-    const seeds = [0n, 1n, 2n ** 32n, 2n ** 63n, 2n ** 64n - 1n];
-    assert.equal(new Set(seeds.map((seed) => latents.draw(seed, 0, 8, 1).join())).size, seeds.length);
+test("seeds and streams differ in every bit of theirs", () => {
+    const ends = [0n, 1n, 2n ** 32n, 2n ** 63n, 2n ** 64n - 1n];
+    const drawn = ends.flatMap((seed) => ends.map((stream) => latents.draw(seed, stream, 0, 8, 1).join()));
+    assert.equal(new Set(drawn).size, ends.length ** 2);
+});
+
+test("streams are those of the documentation", async () => {
+    const page = await readFile(new URL("../../docs/random_numbers.md", import.meta.url), "utf-8");
+    const rows = [...page.matchAll(/^\| `(.*)\/(.*)\/(.*)\/0\/` \| (\S+) \| `(0x[0-9a-f]{16})` \|$/gm)];
+    assert.ok(rows.length >= 4);
+    for (const [, architecture, flux, medium, depth, stream] of rows) {
+        assert.equal(modelStream({ architecture, flux, medium, depth_m: Number(depth) }), BigInt(stream));
+    }
 });
 
 test("a seed is a whole number of 64 bits", () => {

@@ -19,13 +19,28 @@ test("large numbers can be read", () => {
 });
 
 test("a number of muons may be written in the ways of deepmuon-gen", () => {
-    for (const text of ["1000000", "1e6", "1,000,000", "1_000_000", " 1 000 000 "]) {
+    for (const text of ["1000000", "1e6", "1,000,000", "1_000_000", " 1 000 000 ", "1M", "1.0 M", "1000k", "0.001e9"]) {
         assert.equal(readNumber(text, 1e7), 1e6, text);
     }
 });
 
 test("what is no number of muons is refused in words", () => {
-    for (const text of ["", "many", "0", "-5", "1.5", "1e400", "NaN"]) {
+    for (const text of [
+        "",
+        "many",
+        "0",
+        "-5",
+        "1.5",
+        "1e400",
+        "NaN",
+        "1,5",
+        "1,5M",
+        "10,00,000",
+        "10m",
+        "0x10",
+        "1e-3",
+        "M",
+    ]) {
         assert.throws(() => readNumber(text, 1e7), /How many muons/, text);
     }
     assert.throws(() => readNumber("1e8", 1e7), /10,000,000 muons at most/);

@@ -72,3 +72,15 @@ def test_the_rate_falls_with_depth_as_the_surviving_fraction(architecture: str):
     rates = [released_model(depth, architecture).rate_hz_per_m2 for depth in DEPTHS]
     # Of held-out CRY muons carried directly from sea level to each depth.
     assert np.divide(rates, rates[0]) == pytest.approx([1, 0.5045, 0.2695, 0.1642, 0.1094, 0.0775], rel=0.005)
+
+
+def test_any_two_models_of_a_seed_have_nothing_in_common():
+    """The correlation of log E is within 4 standard deviations: 66 pairs give one false alarm in 240 seeds."""
+    n = 50_000
+    energies = [
+        Generator.open(model.depth_m, model.architecture, device="cpu").sample(n, seed=1).kinetic_energy
+        for model in list_models()
+    ]
+    correlations = np.corrcoef(np.log(energies))[np.triu_indices(len(energies), 1)]
+    assert len(correlations) == 66
+    assert np.abs(correlations).max() < 4 / np.sqrt(n)

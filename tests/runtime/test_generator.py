@@ -53,7 +53,7 @@ def test_a_muon_is_made_of_its_own_latents(generator, many):
     """The graph is simple enough to be done again in numpy."""
     size = 4 * generator.model.muons_per_draw
     draws = -(-len(many) // generator.model.muons_per_draw)
-    l0, l1, l2, l3 = latents(5, 0, draws, size).reshape(-1, 4)[: len(many)].T.astype(float)
+    l0, l1, l2, l3 = latents(5, 0, draws, size, generator.model.stream).reshape(-1, 4)[: len(many)].T.astype(float)
     cosine, azimuth = 0.55 + 0.4 * l1, np.pi * l2
     np.testing.assert_allclose(many.kinetic_energy, np.exp(3 * l0), rtol=1e-5)
     np.testing.assert_allclose(many.cos_zenith, cosine, rtol=1e-5)
@@ -83,7 +83,7 @@ def test_muons_far_away_are_made_of_their_own_latents(generator, first):
     per_draw = generator.model.muons_per_draw
     draw, skipped = divmod(first, per_draw)
     draws = -(-(skipped + 1000) // per_draw)
-    l0 = latents(5, draw, draws, 4 * per_draw).reshape(-1, 4)[skipped : skipped + 1000, 0]
+    l0 = latents(5, draw, draws, 4 * per_draw, generator.model.stream).reshape(-1, 4)[skipped : skipped + 1000, 0]
     np.testing.assert_allclose(generator.sample(1000, seed=5, first=first).kinetic_energy, np.exp(3 * l0), rtol=1e-5)
 
 
@@ -146,10 +146,45 @@ def test_other_seeds_give_other_muons(generator):
 def test_a_draw_may_be_larger_than_a_block(tmp_path):
     """Blocks are then of one draw, which begins anywhere among the words of the stream."""
     generator = opened(tmp_path, tiny_model(20_001))
-    l0 = latents(5, 0, 8, 4 * 20_001).reshape(-1, 4)[:, 0].astype(float)
+    l0 = latents(5, 0, 8, 4 * 20_001, generator.model.stream).reshape(-1, 4)[:, 0].astype(float)
     many = generator.sample(8 * 20_001, seed=5)
     np.testing.assert_allclose(many.kinetic_energy, np.exp(3 * l0), rtol=1e-5)
     assert are_equal(generator.sample(30_000, seed=5, first=50_000), many[50_000:80_000])
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"depth_m": "10.5"},
+        {"medium": "rock"},
+        {"flux": "measured"},
+        {"architecture": "another"},
+        {"created_by": "another program 1.0"},
+    ],
+    ids=lambda changes: next(iter(changes)),
+)
+def test_another_model_gives_other_muons_of_a_seed(tmp_path, changes):
+    """The two have the same graph; the correlation is within 4 standard deviations: 6e-5 false alarms for each."""
+    n = 100_000
+    one, other = (
+        np.log(opened(tmp_path, tiny_model(metadata=metadata)).sample(n, seed=1).kinetic_energy)
+        for metadata in ({}, changes)
+    )
+    assert abs(np.corrcoef(one, other)[0, 1]) < 4 / np.sqrt(n)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ({"created_by": "the tests 1.0"}, {"created_by": "the tests 2.0"}),
+        ({"created_by": "tests", "flux": "cry"}, {"created_by": "another", "flux": "cry"}),
+        ({"depth_m": "10"}, {"depth_m": "1e1"}),
+        ({"rate_hz_per_m2": "1"}, {"rate_hz_per_m2": "2"}),
+    ],
+)
+def test_what_is_no_part_of_a_models_stream_changes_nothing(tmp_path, one, other):
+    a, b = (opened(tmp_path, tiny_model(metadata=metadata)).sample(100, seed=1) for metadata in (one, other))
+    assert are_equal(a, b)
 
 
 def test_without_a_seed_no_two_samples_are_equal(generator):
@@ -225,7 +260,7 @@ def test_progress_counts_every_muon_once(model_file, tmp_path):
     assert len(steps) > 1
 
 
-@pytest.mark.parametrize("n", [-1, 1.5, 2**53 + 1, float("nan"), float("inf")])
+@pytest.mark.parametrize("n", [-1, 1.5, 2**53 + 1, float("nan"), float("inf"), "10", None, [10]])
 def test_a_number_that_is_none_is_refused(model_file, tmp_path, n):
     generator = Generator.open(file=model_file)
     for refused in (generator.sample, generator.chunks, lambda n: generator.write(tmp_path / "m.h5", n)):
@@ -234,7 +269,7 @@ def test_a_number_that_is_none_is_refused(model_file, tmp_path, n):
     assert not (tmp_path / "m.h5").exists()
 
 
-@pytest.mark.parametrize(("n", "first"), [(1, -1), (1, 0.5), (1, 2**53), (2**53, 1), (0, float("nan"))])
+@pytest.mark.parametrize(("n", "first"), [(1, -1), (1, 0.5), (1, 2**53), (2**53, 1), (0, float("nan")), (1, "0")])
 def test_muons_beyond_the_numbers_there_are_are_refused(model_file, n, first):
     generator = Generator.open(file=model_file)
     for refused in (generator.sample, generator.chunks):
@@ -242,7 +277,7 @@ def test_muons_beyond_the_numbers_there_are_are_refused(model_file, n, first):
             refused(n, first=first)
 
 
-@pytest.mark.parametrize("seed", [-1, 2**64])
+@pytest.mark.parametrize("seed", [-1, 2**64, 1.5, "1", float("nan"), float("inf")])
 def test_a_seed_that_is_none_is_refused(model_file, seed):
     with pytest.raises(RefusedError, match="the seed"):
         Generator.open(file=model_file).sample(1, seed)
@@ -261,7 +296,7 @@ def test_more_muons_than_the_disk_holds_are_refused_with_both_sizes(model_file, 
 
 def test_a_bad_muon_is_a_failure_that_names_it_and_leaves_no_file(tmp_path):
     generator = opened(tmp_path, tiny_model(edits=RARELY_BAD))
-    number = int(np.argmax(np.abs(latents(3, 0, 1_000_000, 4)[:, 0] - np.float32(0.3)) < 1e-5))
+    number = int(np.argmax(np.abs(latents(3, 0, 1_000_000, 4, generator.model.stream)[:, 0] - np.float32(0.3)) < 1e-5))
     assert number > 1000
     assert len(generator.sample(number, seed=3)) == number  # a bad one beyond the end does not matter
     for fails in (generator.sample, lambda n, seed: generator.write(tmp_path / "muons.h5", n, seed)):
@@ -291,7 +326,7 @@ def test_a_live_time_that_is_none_is_refused(model_file, live_time):
         Generator.open(file=model_file).number_in_live_time(live_time, 1.0, seed=1)
 
 
-@pytest.mark.parametrize("threads", [0, -1])
+@pytest.mark.parametrize("threads", [0, -1, 1.5, "2"])
 def test_no_threads_are_refused(model_file, threads):
     with pytest.raises(RefusedError, match="threads can't make muons"):
         Generator.open(file=model_file, threads=threads)
@@ -302,6 +337,25 @@ def test_a_model_is_named_by_depth_or_by_file_and_not_by_both(model_file):
         Generator.open()
     with pytest.raises(RefusedError, match="give the file alone"):
         Generator.open(10, file=model_file)
+
+
+@pytest.mark.parametrize(("live_time", "area"), [("10", 1.0), (10.0, "1"), (None, 1.0)])
+def test_a_live_time_or_an_area_that_is_no_number_is_refused(model_file, live_time, area):
+    with pytest.raises(RefusedError, match=r"is no (live time|area)"):
+        Generator.open(file=model_file).number_in_live_time(live_time, area, seed=1)
+
+
+@pytest.mark.usefixtures("released")
+@pytest.mark.parametrize("depth", ["10", [10], 10j])
+def test_a_depth_that_is_no_number_is_refused(depth):
+    with pytest.raises(RefusedError, match="is no number: give metres, such as depth=10"):
+        Generator.open(depth=depth)
+
+
+@pytest.mark.usefixtures("released")
+@pytest.mark.parametrize("number", [np.float32(10), np.int64(10)], ids=repr)
+def test_numpys_numbers_are_numbers(number):
+    assert len(Generator.open(depth=number).sample(number, seed=number)) == 10
 
 
 @pytest.mark.usefixtures("released")

@@ -13,6 +13,8 @@ from deepmuon_runtime.muons import Muons
 from deepmuon_training.data.cry import CRY_SHOWER_VARIANCE, HELD_OUT_CRY_MUONS, read_cry
 from deepmuon_training.sample import Sample, read_sample, write_sample
 
+pytestmark = pytest.mark.filterwarnings("ignore:.* below 1 MeV, and dropped")  # of six muons of CRY, for once, two are
+
 MUONS = Muons.of([1.0, 0.002, 300.0], [0.0, 0.6, 0.0], [0.0, 0.0, -0.6], [-1.0, -0.8, -0.8], [13, -13, 13])
 
 CRY = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from deepmuon_runtime.muons import Muons
 __all__ = [
     "Sample",
     "read_sample",
+    "sample_of",
     "write_sample",
 ]
 
@@ -34,9 +36,12 @@ class Sample:
     medium : str
         Geant4's name of the overburden.
     rate, rate_uncertainty : float or None
-        Muons per second and m2 of the plane, and its standard uncertainty; None where unknown.
+        Muons per second and m2 of the plane, and its statistical standard uncertainty; None where unknown.
     smoothed : bool or None
         Whether the generator's histogram steps were taken out.
+    variance_factor : float or None
+        How many times larger than of independent muons the variance of counts is: above 1 where muons come in showers;
+        None where nobody said.
     """
 
     muons: Muons
@@ -47,6 +52,7 @@ class Sample:
     rate: float | None = None
     rate_uncertainty: float | None = None
     smoothed: bool | None = None
+    variance_factor: float | None = None
 
     def __len__(self) -> int:
         """Return the number of muons."""
@@ -67,6 +73,7 @@ class Sample:
             "rate_hz_per_m2": self.rate,
             "rate_uncertainty_hz_per_m2": self.rate_uncertainty,
             "smoothed": self.smoothed,
+            "variance_factor": self.variance_factor,
         }
         return {name: value for name, value in attributes.items() if value is not None}
 
@@ -86,19 +93,24 @@ def read_sample(path: str | Path, first: int = 0, count: int | None = None) -> S
     RefusedError
         If the file is no such file, or does not hold the muons asked for.
     """
-    attributes = read_attributes(path)
+    return sample_of(read_muons(path, first, count), read_attributes(path))
+
+
+def sample_of(muons: Muons, attributes: Mapping[str, Any]) -> Sample:
+    """Return muons with what the attributes of a muon file say of them."""
     rate = attributes.get("rate_hz_per_m2")
     uncertainty = attributes.get("rate_uncertainty_hz_per_m2")
-    smoothed = attributes.get("smoothed")
+    smoothed, variance_factor = attributes.get("smoothed"), attributes.get("variance_factor")
     return Sample(
-        muons=read_muons(path, first, count),
+        muons=muons,
         depth_m=float(attributes["depth_m"]),
-        source=str(attributes.get("source", attributes["created_by"])),
+        source=str(attributes.get("source") or attributes["created_by"]),
         provenance=tuple(str(line) for line in attributes.get("provenance", ())),
         medium=str(attributes["medium"]),
         rate=None if rate is None else float(rate),
         rate_uncertainty=None if uncertainty is None else float(uncertainty),
         smoothed=None if smoothed is None else bool(smoothed),
+        variance_factor=None if variance_factor is None else float(variance_factor),
     )
 
 

@@ -8,6 +8,7 @@
 3      `deepmuon-check` found a defect
 129    stopped by SIGHUP: the terminal or the connection was closed
 130    stopped by Ctrl-C
+141    nobody read stdout to its end, as before `| head`; nothing is said
 143    stopped by SIGTERM
 128+n  ended by another signal, of number n
 =====  ===========================================================================================
@@ -25,7 +26,7 @@ from typing import Any, NoReturn
 
 import click
 
-from deepmuon_cli.process.stdout import watched_stdout
+from deepmuon_cli.process.stdout import ReaderGoneError, watched_stdout
 
 __all__ = ["DEFECTIVE", "REFUSED", "SIGNALS", "complain", "run"]
 
@@ -147,6 +148,8 @@ def _outcome(command: click.Command, name: str) -> tuple[int, str]:
         if isinstance(error, click.NoSuchOption) and error.possibilities:
             del error.possibilities[1:]  # after the nearest come distant ones
         return REFUSED, " ".join(error.format_message().split())
+    except ReaderGoneError:
+        return 128 + signal.SIGPIPE, ""
     except OSError as error:  # a folder that vanished at that moment
         return FAILED, str(error)
     except Exception as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 
 from deepmuon_runtime.errors import RefusedError, reason
@@ -10,7 +11,7 @@ from deepmuon_runtime.errors import RefusedError, reason
 __all__ = ["check_output"]
 
 
-def check_output(path: str | Path, overwrite: bool = False) -> Path:
+def check_output(path: str | Path, overwrite: bool = False, inputs: Iterable[str | Path] = ()) -> Path:
     """Tell whether a file can be written at `path`, before the work for it begins.
 
     Parameters
@@ -19,6 +20,8 @@ def check_output(path: str | Path, overwrite: bool = False) -> Path:
         The wanted file; a symbolic link is followed.
     overwrite
         Whether a file that exists may be replaced.
+    inputs
+        Files that are read for it, which are never replaced.
 
     Returns
     -------
@@ -27,8 +30,8 @@ def check_output(path: str | Path, overwrite: bool = False) -> Path:
     Raises
     ------
     RefusedError
-        If something other than a file is there, or a file and `overwrite` is false, or its folder is missing
-        or not writable.
+        If something other than a file is there, or one of `inputs`, or a file and `overwrite` is false, or its folder
+        is missing or not writable.
     """
     try:
         target = Path(os.path.realpath(path))
@@ -36,6 +39,8 @@ def check_output(path: str | Path, overwrite: bool = False) -> Path:
             raise RefusedError(f"{path} is a folder: give the name of a file in it")
         if target.exists() and not target.is_file():
             raise RefusedError(f"{path} is a device or a pipe, and HDF5 needs a regular file")
+        if target.exists() and any(os.path.exists(read) and target.samefile(read) for read in inputs):
+            raise RefusedError(f"{path} is read here, and would be replaced: give the output another name")
         if target.exists() and not overwrite:
             raise RefusedError(
                 f"{path} exists already: choose another name, or ask for it to be overwritten (--overwrite)"

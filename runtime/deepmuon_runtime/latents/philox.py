@@ -1,14 +1,16 @@
 """Random numbers: the same for ever, and at any position at once.
 
-A seed opens streams of 64-bit words. Word j of a stream is word j mod 4 of Philox4x64-10 (Salmon et al.,
-"Parallel random numbers: as easy as 1, 2, 3", SC 2011) at the counter (j // 4 + 1, 0, 0, 0) under the key
-(seed, stream). That is the sequence of `numpy.random.Philox(key=seed + (stream << 64)).random_raw()`, which
-numpy promises never to change, unlike the methods of its Generator.
+A seed and a stream, which belongs to the model (`deepmuon_runtime.latents.stream`), open rows of 64-bit words, one
+for each purpose. Word j of a row is word j mod 4 of Philox4x64-10 (Salmon et al., "Parallel random numbers: as easy
+as 1, 2, 3", SC 2011) at the counter (j // 4 + 1, 0, 0, purpose) under the key (seed, stream). That is the sequence of
+`numpy.random.Philox(key=seed + (stream << 64), counter=purpose << 192).random_raw()`, which numpy promises never to
+change, unlike the methods of its Generator.
 """
 
 from __future__ import annotations
 
 import secrets
+from numbers import Real
 
 import numpy as np
 from numpy.random import Philox
@@ -17,9 +19,10 @@ from numpy.typing import NDArray
 from deepmuon_runtime.errors import RefusedError
 
 __all__ = [
-    "COUNT_STREAM",
+    "FOR_COUNT",
+    "FOR_LATENTS",
+    "FOR_POSITIONS",
     "LARGEST_SEED",
-    "LATENT_STREAM",
     "checked_seed",
     "fill_latents",
     "latents",
@@ -27,11 +30,14 @@ __all__ = [
     "words",
 ]
 
-LATENT_STREAM = 0
-"""The stream of the latents."""
+FOR_LATENTS = 0
+"""The purpose of the words that make latents."""
 
-COUNT_STREAM = 1
-"""The stream that decides how many muons a live time gives."""
+FOR_COUNT = 1
+"""The purpose of the words that decide how many muons a live time gives."""
+
+FOR_POSITIONS = 2
+"""The purpose of the words that put muons on a plane."""
 
 LARGEST_SEED = 2**64 - 1
 
@@ -47,22 +53,24 @@ def new_seed() -> int:
     return secrets.randbits(63)
 
 
-def checked_seed(seed: int) -> int:
-    """Return the seed if it is one, from 0 to 2^64 - 1, else raise RefusedError."""
+def checked_seed(seed: float) -> int:
+    """Return the seed if it is one, a whole number from 0 to 2^64 - 1, else raise RefusedError."""
+    if not isinstance(seed, Real) or seed % 1 != 0:
+        raise RefusedError(f"the seed {seed!r} is no whole number")
     if not 0 <= seed <= LARGEST_SEED:
         raise RefusedError(f"the seed {seed} is not from 0 to 2^64 - 1 ({LARGEST_SEED})")
     return int(seed)
 
 
-def words(seed: int, stream: int, first: int, count: int) -> NDArray[np.uint64]:
-    """Return words `first` to `first + count - 1` of a stream.
+def words(seed: int, stream: int, purpose: int, first: int, count: int) -> NDArray[np.uint64]:
+    """Return words `first` to `first + count - 1` of a row.
 
     Parameters
     ----------
-    seed
+    seed, stream
         0 to 2^64 - 1.
-    stream
-        `LATENT_STREAM` or `COUNT_STREAM`.
+    purpose
+        `FOR_LATENTS`, `FOR_COUNT` or `FOR_POSITIONS`.
     first, count
         Which words.
 
@@ -70,14 +78,14 @@ def words(seed: int, stream: int, first: int, count: int) -> NDArray[np.uint64]:
     -------
     uint64 [count]
     """
-    philox, skipped = _philox(seed, stream, first)
+    philox, skipped = _philox(seed, stream, purpose, first)
     return philox.random_raw(skipped + count)[skipped:]
 
 
-def latents(seed: int, first: int, draws: int, latent_size: int) -> NDArray[np.float32]:
+def latents(seed: int, first: int, draws: int, latent_size: int, stream: int = 0) -> NDArray[np.float32]:
     """Return the latents of consecutive draws: independent, uniform, strictly inside (-1, 1).
 
-    Latent j of draw d is half-word h = d latent_size + j of the stream: the low 32 bits of word h // 2 if h
+    Latent j of draw d is half-word h = d latent_size + j of the row: the low 32 bits of word h // 2 if h
     is even, the high ones if it is odd. With s its upper 24 bits as a signed number, the latent is
     (s + 1/2) / 2^23, an odd multiple of 2^-24, which float32 holds exactly.
 
@@ -89,17 +97,19 @@ def latents(seed: int, first: int, draws: int, latent_size: int) -> NDArray[np.f
         Which draws.
     latent_size
         Latents of a draw.
+    stream
+        That of the model whose muons they make, 0 to 2^64 - 1; 0 where there is none.
 
     Returns
     -------
     float32 [draws, latent_size]
     """
     latent = np.empty((draws, latent_size), np.float32)
-    fill_latents(latent, seed, first)
+    fill_latents(latent, seed, first, stream)
     return latent
 
 
-def fill_latents(latent: NDArray[np.float32], seed: int, first: int) -> None:
+def fill_latents(latent: NDArray[np.float32], seed: int, first: int, stream: int = 0) -> None:
     """Fill an array with the latents of consecutive draws; see `latents`.
 
     Parameters
@@ -110,10 +120,12 @@ def fill_latents(latent: NDArray[np.float32], seed: int, first: int) -> None:
         0 to 2^64 - 1.
     first
         The first of the draws.
+    stream
+        As in `latents`.
     """
     flat = latent.reshape(-1)
     first_word, skipped = divmod(first * latent.shape[1], 2)
-    philox, skipped_words = _philox(seed, LATENT_STREAM, first_word)
+    philox, skipped_words = _philox(seed, stream, FOR_LATENTS, first_word)
     skipped += 2 * skipped_words
     done = 0
     while done < len(flat):
@@ -128,7 +140,7 @@ def fill_latents(latent: NDArray[np.float32], seed: int, first: int) -> None:
         skipped = 0
 
 
-def _philox(seed: int, stream: int, first: int) -> tuple[Philox, int]:
+def _philox(seed: int, stream: int, purpose: int, first: int) -> tuple[Philox, int]:
     """Return a generator at or just before a word, and how many words are to be skipped."""
     counter, skipped = divmod(first, 4)  # numpy counts up before it gives the first word
-    return Philox(key=seed + (stream << 64), counter=counter), skipped
+    return Philox(key=seed + (stream << 64), counter=counter + (purpose << 192)), skipped

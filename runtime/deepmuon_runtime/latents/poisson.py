@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
-from deepmuon_runtime.latents.philox import COUNT_STREAM, words
+from deepmuon_runtime.latents.philox import FOR_COUNT, words
 
 __all__ = ["poisson"]
 
 
-def poisson(mean: float, seed: int) -> int:
-    """Draw the Poisson number that belongs to a seed.
+def poisson(mean: float, seed: int, stream: int) -> int:
+    """Draw the Poisson number that belongs to a seed and a stream.
 
     Up to a mean of 10 by inversion, above it by the transformed rejection PTRS of W. Hörmann, "The
     transformed rejection method for generating Poisson random variables", Insurance: Mathematics and
@@ -20,19 +21,19 @@ def poisson(mean: float, seed: int) -> int:
     ----------
     mean
         The expected number, finite and positive.
-    seed
-        0 to 2^64 - 1; the number is drawn from a stream of its own, apart from the muons'.
+    seed, stream
+        0 to 2^64 - 1; the number is drawn from words of their own, apart from the muons'.
     """
-    return _by_inversion(mean, seed) if mean < 10 else _by_rejection(mean, seed)
+
+    def uniform(position: int) -> float:
+        """Return a number strictly inside (0, 1)."""
+        return ((int(words(seed, stream, FOR_COUNT, position, 1)[0]) >> 12) + 0.5) * 2.0**-52
+
+    return _by_inversion(mean, uniform) if mean < 10 else _by_rejection(mean, uniform)
 
 
-def _uniform(seed: int, position: int) -> float:
-    """Return number `position` of the seed's uniform numbers, strictly inside (0, 1)."""
-    return ((int(words(seed, COUNT_STREAM, position, 1)[0]) >> 12) + 0.5) * 2.0**-52
-
-
-def _by_inversion(mean: float, seed: int) -> int:
-    remaining = _uniform(seed, 0)
+def _by_inversion(mean: float, uniform: Callable[[int], float]) -> int:
+    remaining = uniform(0)
     number, probability = 0, math.exp(-mean)
     while remaining > probability and probability > 0:
         remaining -= probability
@@ -41,7 +42,7 @@ def _by_inversion(mean: float, seed: int) -> int:
     return number
 
 
-def _by_rejection(mean: float, seed: int) -> int:
+def _by_rejection(mean: float, uniform: Callable[[int], float]) -> int:
     # The names are the paper's.
     b = 0.931 + 2.53 * math.sqrt(mean)
     a = -0.059 + 0.02483 * b
@@ -49,8 +50,8 @@ def _by_rejection(mean: float, seed: int) -> int:
     v_r = 0.9277 - 3.6224 / (b - 2)
     position = 0
     while True:
-        u = _uniform(seed, position) - 0.5
-        v = _uniform(seed, position + 1)
+        u = uniform(position) - 0.5
+        v = uniform(position + 1)
         position += 2
         us = 0.5 - abs(u)
         k = math.floor((2 * a / us + b) * u + mean + 0.43)

@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError, distribution
 import onnxruntime
 
 from deepmuon_runtime.errors import RefusedError, first_line
+from deepmuon_runtime.model.look_ups import with_gather
 
 __all__ = ["DEVICES", "open_session"]
 
@@ -92,8 +93,8 @@ def _load_on_cuda(content: bytes, name: str) -> onnxruntime.InferenceSession | N
         with redirect_stdout(io.StringIO()):
             onnxruntime.preload_dlls(directory="")
     try:
-        session = _load(content, name, CUDA_PROVIDER)
-    except RefusedError:
+        session = _load(with_gather(content), name, CUDA_PROVIDER)
+    except (RefusedError, ValueError):
         return None
     return session if CUDA_PROVIDER in session.get_providers() else None
 

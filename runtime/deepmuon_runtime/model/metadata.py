@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -10,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.latents.stream import model_stream
 
 __all__ = ["CONTRACT_VERSION", "LARGEST_DRAW", "LATENTS_PER_MUON", "METADATA_PREFIX", "Model", "is_name"]
 
@@ -51,6 +53,8 @@ class Model:
         Range of the kinetic energy.
     created_by, licence
         Program that made the file, and the licence under which it may be used.
+    flux
+        The flux at the surface, by its name: `cry`. Where the file does not say it, the name of its creator.
     rate_hz_per_m2, rate_uncertainty_hz_per_m2
         Muons through a horizontal square metre per second, or None where unknown.
     metadata
@@ -69,6 +73,7 @@ class Model:
     energy_max_gev: float
     created_by: str
     licence: str
+    flux: str
     rate_hz_per_m2: float | None
     rate_uncertainty_hz_per_m2: float | None
     metadata: Mapping[str, str]
@@ -99,8 +104,18 @@ class Model:
             values[key] = _value(name, key, texts[key], rule) if key in texts else None
         if values["energy_min_gev"] >= values["energy_max_gev"]:
             raise RefusedError(f"{name} breaks the contract: energy_min_gev is not below energy_max_gev")
+        values["flux"] = values["flux"] or _creator(values["created_by"])
         del values["contract_version"]
         return cls(name=name, sha256=sha256, size=size, metadata=texts, **values)
+
+    @property
+    def stream(self) -> int:
+        """The stream of random numbers that makes its muons, 0 to 2^64 - 1."""
+        return model_stream(self.architecture, self.flux, self.medium, HORIZONTAL_PLANE, self.depth_m)
+
+
+HORIZONTAL_PLANE = 0
+"""The surface that the muons of contract 1 cross."""
 
 
 class _Rule(NamedTuple):
@@ -140,7 +155,13 @@ _REQUIRED = {
     "created_by": _TEXT,
     "licence": _TEXT,
 }
-_OPTIONAL = {"rate_hz_per_m2": _POSITIVE, "rate_uncertainty_hz_per_m2": _NOT_NEGATIVE}
+_OPTIONAL = {"flux": _NAME, "rate_hz_per_m2": _POSITIVE, "rate_uncertainty_hz_per_m2": _NOT_NEGATIVE}
+
+
+def _creator(created_by: str) -> str:
+    """Return the name of the program without its version: what stands before the first digit and its spaces."""
+    name, *_ = re.split("[0-9]", created_by, maxsplit=1)
+    return name.rstrip(" ")
 
 
 def _value(name: str, key: str, text: str, rule: _Rule) -> Any:

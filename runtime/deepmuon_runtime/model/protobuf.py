@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-__all__ = ["fields"]
+__all__ = ["field", "fields", "parts"]
 
 VARINT, EIGHT_BYTES, LENGTH, FOUR_BYTES = 0, 1, 2, 5
 FIXED = {EIGHT_BYTES: 8, FOUR_BYTES: 4}
@@ -32,15 +32,33 @@ def fields(message: memoryview) -> Iterator[tuple[int, int | memoryview]]:
     ValueError
         If the bytes are no message.
     """
+    for number, value, _ in parts(message):
+        yield number, value
+
+
+def field(number: int, content: bytes) -> bytes:
+    """Return a field that holds a text, numbers or a message."""
+    return _as_varint(number << 3 | LENGTH) + _as_varint(len(content)) + content
+
+
+def parts(message: memoryview) -> Iterator[tuple[int, int | memoryview, memoryview]]:
+    """Yield what `fields` does, and all bytes of the field: joined again, they are the message.
+
+    Raises
+    ------
+    ValueError
+        If the bytes are no message.
+    """
     position = 0
     while position < len(message):
+        start = position
         tag, position = _varint(message, position)
         number, wire_type = tag >> 3, tag & 7
         if number == 0 or tag >= 1 << 32:
             raise ValueError(f"a field has the number {number}")
         if wire_type == VARINT:
-            value, position = _varint(message, position)
-            yield number, value
+            varint, position = _varint(message, position)
+            yield number, varint, message[start:position]
             continue
         if wire_type == LENGTH:
             size, position = _varint(message, position)
@@ -50,8 +68,9 @@ def fields(message: memoryview) -> Iterator[tuple[int, int | memoryview]]:
             raise ValueError(f"a field has the wire type {wire_type}")
         if size > len(message) - position:
             raise ValueError("a field is cut off")
-        yield number, message[position : position + size]
+        value = message[position : position + size]
         position += size
+        yield number, value, message[start:position]
 
 
 def _varint(message: memoryview, position: int) -> tuple[int, int]:
@@ -66,3 +85,9 @@ def _varint(message: memoryview, position: int) -> tuple[int, int]:
         if byte < 0x80:
             return number & 0xFFFF_FFFF_FFFF_FFFF, position
     raise ValueError("a number has more than ten bytes")
+
+
+def _as_varint(number: int) -> bytes:
+    """Return the same of a number."""
+    groups = [number >> shift & 0x7F for shift in range(0, max(number.bit_length(), 1), 7)]
+    return bytes([*(group | 0x80 for group in groups[:-1]), groups[-1]])

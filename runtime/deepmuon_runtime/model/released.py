@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from importlib.resources import files
+from numbers import Real
 from typing import Any
 
 from deepmuon_runtime.errors import RefusedError
@@ -51,6 +52,8 @@ def released_model(depth: float, architecture: str | None = None) -> Model:
     RefusedError
         If there is none; the text lists those there are.
     """
+    if not isinstance(depth, Real):
+        raise RefusedError(f"the depth {depth!r} is no number: give metres, such as depth=10")
     wanted = architecture or default_architecture()
     models = list_models()
     architectures = sorted({model.architecture for model in models})

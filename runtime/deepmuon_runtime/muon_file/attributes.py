@@ -75,6 +75,7 @@ WHERE_KNOWN = {
     "smoothed": _Rule(lambda x: isinstance(x, bool), "true or false"),
     "rate_hz_per_m2": POSITIVE,
     "rate_uncertainty_hz_per_m2": NOT_NEGATIVE,
+    "variance_factor": POSITIVE,
     "live_time_s_m2": NOT_NEGATIVE,
     "live_time_s": POSITIVE,
     "area_m2": POSITIVE,

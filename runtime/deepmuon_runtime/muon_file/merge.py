@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,6 +10,7 @@ from zlib import crc32
 import numpy as np
 
 from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.files.output import check_output
 from deepmuon_runtime.latents.shard import WHOLE_RUN
 from deepmuon_runtime.muon_file.checksum import unlike
 from deepmuon_runtime.muon_file.format import COLUMNS
@@ -79,7 +79,7 @@ def merge_shards(
     parts.sort(key=lambda part: (part.first, part.end))
     for part in parts[1:]:
         _check_same_run(parts[0], part)
-    _check_apart(parts, output)
+    check_output(output, overwrite, [part.path for part in parts])  # a virtual file would look for muons in itself
     total = parts[0].attributes["total"]
     _check_complete(parts, total)
     described = {name: value for name, value in parts[0].attributes.items() if name != "live_time_s_m2"}
@@ -124,13 +124,6 @@ def _check_same_run(part: _Part, other: _Part) -> None:
             raise RefusedError(
                 f"{part.path} and {other.path} are of different runs: their {name} is {one!r} and {two!r}"
             )
-
-
-def _check_apart(parts: Sequence[_Part], output: str | Path) -> None:
-    """Refuse to replace a shard, whose muons a virtual file would look for in itself."""
-    for part in parts:
-        if os.path.exists(output) and os.path.samefile(part.path, output):
-            raise RefusedError(f"{output} is the shard {part.path}: choose another name for the output")
 
 
 def _check_complete(parts: Sequence[_Part], total: int) -> None:

@@ -28,6 +28,30 @@ from deepmuon_runtime.muons import Muons
 
 __all__ = ["MuonWriter", "write_muons"]
 
+SOURCE_DATE_EPOCH = "SOURCE_DATE_EPOCH"
+"""Environment variable that states the time of `created`, so that a repeated run gives the same bytes
+(https://reproducible-builds.org/specs/source-date-epoch/)."""
+
+
+def _stated_time() -> datetime | None:
+    """Return the time that the environment states for all that is made, if it does.
+
+    Raises
+    ------
+    RefusedError
+        If it is none.
+    """
+    stated = os.environ.get(SOURCE_DATE_EPOCH)
+    if stated is None:
+        return None
+    try:
+        return datetime.fromtimestamp(int(stated), timezone.utc)
+    except (ValueError, OverflowError, OSError) as error:
+        raise RefusedError(
+            f"{SOURCE_DATE_EPOCH} is {stated!r}, and should be whole seconds since 1970 (unset it for the present time)"
+        ) from error
+
+
 LARGEST_CHUNK = 1 << 17  # muons of one HDF5 chunk: smaller ones cost time and memory, larger ones gain nothing
 SMALLEST_CHUNK = 1 << 10  # but a file of a few muons should not carry a large empty chunk
 
@@ -58,7 +82,7 @@ class MuonWriter:
     Raises
     ------
     RefusedError
-        On construction and entry, if `path` can't be written or an attribute is missing.
+        On construction and entry, if `path` can't be written, an attribute is missing, or SOURCE_DATE_EPOCH is no time.
     FailedError
         Later, if writing fails (disk full), or another process has written `path` meanwhile.
     """
@@ -73,6 +97,7 @@ class MuonWriter:
         if missing:
             raise RefusedError(f"a muon file must say its {' and '.join(missing)}: add it to the attributes")
         self.count = 0
+        self._created = _stated_time()
         self._attributes = dict(attributes)
         self._columns: dict[str, h5py.Dataset] = {}
         self._checksums = dict.fromkeys(COLUMNS, 0)
@@ -214,7 +239,7 @@ class MuonWriter:
     def _all_attributes(self) -> dict[str, object]:
         attributes = {"created_by": f"deepmuon-runtime {version('deepmuon-runtime')}", **self._attributes}
         attributes["count"] = self.count
-        attributes["created"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
+        attributes["created"] = (self._created or datetime.now(timezone.utc)).isoformat(timespec="seconds")
         rate = attributes.get("rate_hz_per_m2")
         if isinstance(rate, (int, float, np.number)) and rate > 0:
             attributes["live_time_s_m2"] = self.count / float(rate)

@@ -41,21 +41,21 @@ def test_the_reference_gives_the_published_vectors_of_random123():
     ]
 
 
-@given(seed=SEEDS, stream=st.integers(0, 1), first=st.integers(0, 2**60), count=st.integers(1, 9))
-def test_words_are_philox_at_the_documented_counter(seed, stream, first, count):
-    expected = [philox4x64([j // 4 + 1, 0, 0, 0], [seed, stream])[j % 4] for j in range(first, first + count)]
-    assert words(seed, stream, first, count).tolist() == expected
+@given(seed=SEEDS, stream=SEEDS, purpose=st.integers(0, 3), first=st.integers(0, 2**60), count=st.integers(1, 9))
+def test_words_are_philox_at_the_documented_counter(seed, stream, purpose, first, count):
+    expected = [philox4x64([j // 4 + 1, 0, 0, purpose], [seed, stream])[j % 4] for j in range(first, first + count)]
+    assert words(seed, stream, purpose, first, count).tolist() == expected
 
 
-@given(seed=SEEDS, first=st.integers(0, 2**50), latent_size=st.integers(1, 7))
-def test_latents_follow_the_documented_formula(seed, first, latent_size):
+@given(seed=SEEDS, stream=SEEDS, first=st.integers(0, 2**50), latent_size=st.integers(1, 7))
+def test_latents_follow_the_documented_formula(seed, stream, first, latent_size):
     def expected(half: int) -> float:
-        word = philox4x64([half // 8 + 1, 0, 0, 0], [seed, 0])[half // 2 % 4]
+        word = philox4x64([half // 8 + 1, 0, 0, 0], [seed, stream])[half // 2 % 4]
         bits = word >> 32 if half % 2 else word & 0xFFFFFFFF
         upper = (bits >> 8) - (2**24 if bits >> 31 else 0)
         return (upper + 0.5) / 2**23
 
-    found = latents(seed, first, 3, latent_size)
+    found = latents(seed, first, 3, latent_size, stream)
     assert found.shape == (3, latent_size)
     assert found.dtype == np.float32
     assert found.ravel().tolist() == [expected(half) for half in range(first * latent_size, (first + 3) * latent_size)]
@@ -86,8 +86,9 @@ def test_latents_are_uniform_strictly_inside_their_interval():
     assert ((counts - expected) ** 2 / expected).sum() < 255 + 5 * 22.6
 
 
-def test_seeds_and_streams_share_no_words():
-    samples = [words(seed, stream, 0, 10_000) for seed in (0, 1, LARGEST_SEED) for stream in (0, 1)]
+def test_seeds_streams_and_purposes_share_no_words():
+    ends = (0, 1, LARGEST_SEED)
+    samples = [words(seed, stream, purpose, 0, 10_000) for seed in ends for stream in ends for purpose in (0, 1)]
     together = np.concatenate(samples)
     assert len(np.unique(together)) == len(together)
 

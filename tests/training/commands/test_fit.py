@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import shlex
 import subprocess
 import sysconfig
@@ -20,9 +21,9 @@ from deepmuon_runtime import Generator, Muons
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_training.commands.train import train
 from deepmuon_training.learning import charge
-from deepmuon_training.mountain import behind_mountain
 from deepmuon_training.sample import Sample, write_sample
 from deepmuon_training.scores import evaluate
+from studies.pictures.mountain import behind_mountain
 
 COMMAND = Path(sysconfig.get_path("scripts")) / "deepmuon-train"
 
@@ -138,6 +139,72 @@ def test_ctrl_c_leaves_a_checkpoint_from_which_the_same_command_goes_on(run, mon
     run(FIT)
     assert digest("generator.pt") == digest("undisturbed.pt")
     assert not Path("generator.pt.checkpoint").exists()
+
+
+def flip(path: str, at: int) -> None:
+    """Change 400 bytes of a file."""
+    content = np.frombuffer(Path(path).read_bytes(), np.uint8).copy()
+    content[at : at + 400] ^= 0x55
+    Path(path).write_bytes(content.tobytes())
+
+
+def test_a_damaged_generator_is_not_exported(run):
+    run(FIT)
+    size = Path("generator.pt").stat().st_size
+    for place in 0, size // 3, size // 2, size - 400:
+        flip("generator.pt", place)
+        done = subprocess.run([COMMAND, "export", "generator.pt", "-o", "model.onnx"], capture_output=True, text=True)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert re.fullmatch(
+            r"deepmuon-train: generator.pt is (damaged|no generator)[^\n]*: fit it again\n", done.stderr
+        )
+        assert not Path("model.onnx").exists()
+        flip("generator.pt", place)
+    run("export generator.pt -o model.onnx")
+
+
+def test_a_damaged_checkpoint_is_not_gone_on_from(run, monkeypatch):
+    def stopping(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("deepmuon_training.generators.quantile.fit.regress", stopping)
+        with pytest.raises((KeyboardInterrupt, click.Abort)):
+            run(FIT)
+    flip("generator.pt.checkpoint/charge.pt", 5000)
+    done = subprocess.run([COMMAND, *shlex.split(FIT)], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert re.fullmatch(r"deepmuon-train: generator.pt.checkpoint/charge.pt is damaged.*: remove it\n", done.stderr)
+
+
+def test_muons_with_tied_energies_end_the_command_with_exit_code_2(run, sample):
+    energy = np.maximum(np.round(sample.muons.kinetic_energy[:5000], 1), np.float32(0.1))
+    write_sample("rounded.h5", replace(sample, muons=replace(sample.muons[:5000], kinetic_energy=energy)))
+    done = subprocess.run([COMMAND, "fit", "rounded.h5", "-o", "x.pt"], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert re.fullmatch(
+        r"deepmuon-train: [\d.]+% of the muons \(\d+ of 5,000\) have the same kinetic energy of 0\.\d GeV, .*\n",
+        done.stderr,
+    )
+
+
+def test_a_source_that_was_cut_gives_a_model_that_is_cut_there(run, sample):
+    cut = sample.muons[:20_000][(sample.muons.kinetic_energy[:20_000] > 1) & (sample.muons.charge[:20_000] < 0)]
+    write_sample("cut.h5", replace(sample, muons=cut))
+    for command in (
+        "fit cut.h5 -o cut.pt --settings quantile.toml --zenith-max 89.5",
+        "export cut.pt -o cut.onnx",
+    ):
+        subprocess.run([COMMAND, *shlex.split(command)], check=True, capture_output=True)
+    generator = Generator.open(file="cut.onnx", device="cpu")
+    muons = generator.sample(1_000_000, seed=1)
+    assert muons.kinetic_energy.min() >= cut.kinetic_energy.min() == np.float32(generator.model.energy_min_gev)
+    assert muons.cos_zenith.min() >= np.cos(np.radians(89.5))
+    assert (muons.charge == -1).all()
+    assert (generator.model.metadata["zenith_max_deg"], generator.model.metadata["only_charge"]) == ("89.5", "-1")
+    done = subprocess.run([COMMAND, "fit", "cut.h5", "-o", "x.pt", "--energy-min", "2"], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "outside of the 2 GeV that were stated" in done.stderr
 
 
 def test_the_checkpoint_of_other_muons_is_refused(run, sample, monkeypatch):
@@ -258,13 +325,40 @@ def test_a_report_is_replaced_only_if_wanted_and_the_same_again(run, model):
 
 
 def test_a_model_that_others_made_can_be_evaluated(run):
-    metadata = {"architecture": "normalising flow <b>", "rate_hz_per_m2": None}
+    metadata = {"architecture": "normalising flow <b>", "rate_hz_per_m2": None, "depth_m": "0.0"}
     energies = {"energy_min_gev": "0.001", "energy_max_gev": "100000"}
     Path("other.onnx").write_bytes(tiny_model(metadata=metadata | energies))
     run("evaluate other.onnx held_out.h5 -o report.html -n 1e5")
     page = Path("report.html").read_text()
     assert "normalising flow &lt;b&gt;" in page
-    assert "There are no targets for this architecture" in page
+    assert "There are no targets for this architecture; beyond noise: KS energy" in page
+    assert re.search(r"differs by \d+ sigma", page)
+    assert 'class="missed"' not in page
+
+
+def test_muons_of_another_depth_or_medium_are_not_compared(run, model, sample):
+    for place in {"depth_m": 10.0}, {"depth_m": 10.0, "medium": "standard_rock 2.65 g/cm3"}:
+        write_sample("other.h5", replace(sample, **place), overwrite=True)
+        done = subprocess.run([COMMAND, "evaluate", model, "other.h5", "-o", "x.html"], capture_output=True, text=True)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert done.stderr == (
+            "deepmuon-train: model.onnx gives muons under 0 m of G4_WATER, and the held-out ones are from under 10 m "
+            f"of {place.get('medium', 'G4_WATER')}: compare muons of one place\n"
+        )
+        assert not Path("x.html").exists()
+
+
+def test_an_uncertainty_that_nobody_stated_is_unknown_and_targets_say_what_can_be_told(run, model, sample):
+    write_sample("unsure.h5", replace(sample, rate_uncertainty=None))
+    words = [COMMAND, "evaluate", model, "unsure.h5", "-o", "x.html", "-n", "1e5", "--variance-factor", "1.2"]
+    out = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    assert re.search(r"\| rate \(Hz/m2\), statistical errors \| 129 \| 129 ± 0.25 and unknown \|  \|", out)
+    assert re.search(r"\| tail above 1 TeV .*\| excess ≤ 0.05 \| ± [\d.]+ \| too few muons to tell \|", out)
+    for edges in "0 to 0.05", "0.05 to 0.1", "0.1 to 0.15", "0.15 to 0.2":
+        assert f"| cos zenith {edges} |" in out
+    page = Path("x.html").read_text()
+    assert "vary by 1.2 times the variance" in page
+    assert '<td class="text">0.00</td><td class="text">0.05</td>' in page
 
 
 def test_too_few_held_out_muons_are_refused(run, model):

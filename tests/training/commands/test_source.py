@@ -122,6 +122,13 @@ def test_a_table_is_a_flux_with_its_own_energies_and_charges(source, tmp_path):
     assert abs(np.sum(muons.kinetic_energy > 5) - 2e5 * above_5) < 3.9 * np.sqrt(2e5 * above_5 * (1 - above_5))
 
 
+def test_a_table_that_is_read_is_never_replaced(source, tmp_path):
+    (tmp_path / "mine.csv").write_text(TABLE)
+    with pytest.raises(RefusedError, match="is read here"):
+        source("-n 10 --flux mine.csv -o mine.csv --overwrite")
+    assert (tmp_path / "mine.csv").read_text() == TABLE
+
+
 @pytest.mark.parametrize(
     ("table", "options", "reason"),
     [

@@ -4,17 +4,23 @@ import math
 import os
 import re
 import signal
+import subprocess
 import sys
+import sysconfig
+from pathlib import Path
 
 import numpy as np
 import pytest
 from support.worked_example import run_example
 
 from deepmuon_runtime import Generator, Muons, read_attributes, read_muons, write_muons
+from deepmuon_runtime.muon_file.check import check_file
 from deepmuon_training.commands.train import main
 from deepmuon_training.sample import read_sample
 from deepmuon_training.transport import slab as transport_module
 from deepmuon_training.transport.slab import transport
+
+COMMAND = Path(sysconfig.get_path("scripts")) / "deepmuon-train"
 
 
 @pytest.fixture
@@ -65,8 +71,8 @@ def test_the_survivors_are_those_of_the_library_and_their_number_is_told(carry):
     assert found.provenance == expected.sample.provenance
     first, *fates = out.splitlines()
     assert re.fullmatch(
-        rf"below\.h5: {len(found):,} of 2,000 muons \(\d\d\.\d\d% \+- 1\.1\d%\) under 10 m of G4_WATER, "
-        rf"{found.rate:.4g} muons per m2 and s, seed 3",
+        rf"below\.h5: {len(found):,} of 2,000 muons \(\d\d\.\d\d%, \d\d\.\d\d% to \d\d\.\d\d%\) "
+        rf"under 10 m of G4_WATER, {found.rate:.4g} per m2 and s, seed 3",
         first,
     )
     assert len(found) + sum(int(line.split()[0].replace(",", "")) for line in fates) == 2000
@@ -83,6 +89,28 @@ def test_a_box_of_rock_loses_muons_by_its_sides(carry):
     assert "4 m x 3 m wide" in survivors["provenance"][-1]
 
 
+@pytest.mark.usefixtures("carry")
+def test_where_no_muon_survives_the_limit_is_told_and_nothing_is_written():
+    write_muons("slow.h5", read_muons("sea_level.h5", 0, 100), {"depth_m": 0.0, "medium": "G4_WATER"})
+    words = [COMMAND, "transport", "slow.h5", "--thickness", "4000", "-o", "below.h5"]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == (
+        "deepmuon-train: none of 100 muons survived 4000 m of G4_WATER (at 68 % confidence it is below 0.018 of them): "
+        "carry more, or take a thinner slab\n"
+    )
+    assert not os.path.exists("below.h5")
+
+
+def test_where_all_survive_the_interval_has_a_width_and_the_file_is_sound(carry):
+    write_muons("fast.h5", read_sample("sea_level.h5").muons[:100], {**read_sample("sea_level.h5").attributes})
+    code, out, _ = carry("fast.h5", "--thickness", 1e-6, "--seed", 1, "-o", "below.h5")
+    assert code == 0
+    assert out.startswith("below.h5: 100 of 100 muons (100.00%, 98.18% to 100.00%) under 1e-06 m of G4_WATER, ")
+    assert check_file("below.h5").defects == []
+    assert read_attributes("below.h5")["rate_uncertainty_hz_per_m2"] > 0.9 * 0.0091 * read_sample("below.h5").rate
+
+
 def test_quiet_says_nothing(carry):
     assert carry("sea_level.h5", "--thickness", 1, "-q", "-o", "below.h5") == (0, "", "")
 
@@ -97,17 +125,23 @@ def test_quiet_says_nothing(carry):
         (["--thickness", "-1"], "not a finite number above 0"),
         (["--seed", -1], "-1 is not from 0"),
         (["--processes", 0], "processes"),
-        (["-o", "sea_level.h5"], "exists already"),
+        (["-o", "sea_level.h5"], "sea_level.h5 is read here, and would be replaced"),
+        (["-o", "sea_level.h5", "--overwrite"], "sea_level.h5 is read here, and would be replaced"),
+        (["-o", "link.h5", "--overwrite"], "link.h5 is read here, and would be replaced"),
+        (["-o", "other.h5"], "exists already"),
         (["-o", "no_folder/below.h5"], "no folder"),
     ],
 )
 def test_what_cannot_be_is_refused_before_anything_starts(carry, options, complaint):
+    os.symlink("sea_level.h5", "link.h5")
+    Path("other.h5").write_text("precious")
     before = sorted(os.listdir())
     code, out, err = carry("sea_level.h5", "--thickness", 10, "-o", "below.h5", *options)
     assert (code, out) == (2, "")
     assert complaint in err
     assert err.count("\n") == 1
     assert sorted(os.listdir()) == before
+    assert len(read_muons("sea_level.h5")) == 2000
 
 
 @pytest.mark.usefixtures("no_geant4")

@@ -38,6 +38,21 @@ def test_a_node_of_several_outputs_gives_them_all():
     np.testing.assert_array_equal(run(finished(g, g("Sub", high, low)), np.array([1, 5], dtype=np.float32)), [4])
 
 
+def test_nodes_are_named_by_what_they_are_for():
+    g = Graph()
+    with g.scope("energy"):
+        first = g("Mul", "x", 2.0)
+        with g.scope("look_up"):
+            second = g("Mul", first, 2.0)
+    assert finished(g, g("Add", second, 1.0)).graph.node[-1].name == "output/y"
+    assert [node.name for node in g.nodes] == ["energy/Mul_0", "energy/look_up/Mul_1", "Add_2", "output/y"]
+
+
+def test_a_constant_has_the_name_that_it_was_given_first():
+    g = Graph()
+    assert g.constant(np.ones(3), "table") == g.constant(np.ones(3)) == "table"
+
+
 def test_equal_constants_are_stored_once_and_different_ones_apart():
     g = Graph()
     assert g.constant(1.0) == g.constant(1) == g.constant(np.float32(1))

@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from onnx import TensorProto
-from onnx.reference import ReferenceEvaluator
+from support.engines import reference_evaluator
 
 from deepmuon_runtime import Generator
 from deepmuon_runtime.errors import FailedError, RefusedError
@@ -130,6 +130,13 @@ def test_a_model_has_only_standard_deterministic_operators_and_no_external_data(
     assert all(tensor.data_location == TensorProto.DEFAULT for tensor in proto.graph.initializer)
 
 
+def test_every_node_has_a_name_of_its_own(proto):
+    """ONNX Runtime 1.19 to 1.21 refuse graphs in which they fuse nodes without names."""
+    names = [node.name for node in proto.graph.node]
+    assert all(names)
+    assert len(set(names)) == len(names)
+
+
 def test_the_charge_is_computed_in_float_and_cast_last(proto):
     assert [node.op_type for node in proto.graph.node if "charge" in node.output] == ["Identity"]
     integers = [
@@ -224,7 +231,7 @@ def test_the_reference_evaluator_of_onnx_agrees_with_onnx_runtime(proto, run, ex
         # the evaluator sorts the other way round than the standard says
     latent = np.concatenate([latent, corners])
     energy, direction, charge = run(latent)
-    found_energy, found_direction, found_charge = ReferenceEvaluator(proto).run(OUTPUTS, {"latent": latent})
+    found_energy, found_direction, found_charge = reference_evaluator(proto).run(OUTPUTS, {"latent": latent})
     np.testing.assert_allclose(found_energy, energy, rtol=1e-4)
     np.testing.assert_allclose(found_direction, direction, atol=1e-5)
     assert np.mean(found_charge != charge) < 1e-3
@@ -240,6 +247,12 @@ def test_no_latent_makes_an_unphysical_muon(run, exportable, data):
 
 def test_end_points_make_physical_muons(run, exportable):
     assert_physical(run(end_points(exportable.latent_size)), exportable.energy_range)
+
+
+def test_latents_outside_their_range_are_clamped_to_it(run, exportable):
+    outside = np.random.default_rng(2).choice(np.float32([-1e30, -1.5, 1.0001, 7]), (500, exportable.latent_size))
+    for found, expected in zip(run(outside), run(np.clip(outside, -1, 1)), strict=True):
+        np.testing.assert_array_equal(found, expected)
 
 
 @pytest.mark.parametrize("draws", [1, 7, 1000])
@@ -273,7 +286,7 @@ def test_transformers_are_stored_in_float16(transformer_model, sample, tmp_path)
     assert stored == sum(parameter.numel() for parameter in transformer_model.network.parameters())
 
 
-def test_models_of_the_released_sizes_are_at_most_1_mb(quantile_tables, transformer_model, sample, tmp_path):
+def test_models_of_the_released_sizes_are_small(quantile_tables, transformer_model, sample, tmp_path):
     torch.manual_seed(1)
     wide = TransformerModel.stored(
         Transformer(TransformerSettings().d),
@@ -282,6 +295,6 @@ def test_models_of_the_released_sizes_are_at_most_1_mb(quantile_tables, transfor
         charge=transformer_model.charge,
         energy_range=transformer_model.energy_range,
     )
-    for generator in (quantile_tables, wide):
+    for generator, size in ((quantile_tables, 106_000), (wide, 1_000_000)):
         export(generator, Training.of(sample, seed=1), tmp_path / "model.onnx", overwrite=True)
-        assert (tmp_path / "model.onnx").stat().st_size <= 1_000_000
+        assert (tmp_path / "model.onnx").stat().st_size <= size

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 
 from deepmuon_runtime import Generator
 from deepmuon_runtime.errors import RefusedError
@@ -15,6 +14,8 @@ from deepmuon_training.generators.quantile.fit import QuantileSchedules
 from deepmuon_training.generators.quantile.regression import RegressionSteps
 from deepmuon_training.generators.transformer.fit import TransformerSettings
 from deepmuon_training.learning.descent import Schedule
+from deepmuon_training.learning.support import Stated
+from deepmuon_training.sealed import seal
 
 CHARGE = Schedule(steps=10, learning_rate=0.02, averaging=0.5, validate_every=5)
 TINY = {
@@ -97,15 +98,15 @@ def test_a_file_that_is_no_generator_is_refused(tmp_path, content, capsys):
     if isinstance(content, bytes):
         path.write_bytes(content)
     elif content is not None:
-        torch.save(content, path)
+        path.write_bytes(seal(content))
     with pytest.raises(RefusedError, match="is no generator that deepmuon-train fit wrote"):
         FittedGenerator.load(path)
     assert capsys.readouterr().out == ""
 
 
 def test_a_generator_of_a_later_version_is_refused(tmp_path):
-    torch.save({"format": "deepmuon-generator", "format_version": 2}, tmp_path / "generator.pt")
-    with pytest.raises(RefusedError, match="has format version 2, and this release reads version 1"):
+    (tmp_path / "generator.pt").write_bytes(seal({"format": "deepmuon-generator", "format_version": 3}))
+    with pytest.raises(RefusedError, match="has format version 3, and this release reads version 2"):
         FittedGenerator.load(tmp_path / "generator.pt")
 
 
@@ -143,6 +144,96 @@ def test_the_smallest_sample_can_be_learned(sample, architecture, tmp_path):
     export_fitted(generator, tmp_path / "model.onnx")
 
 
+def with_energies(change):
+    return lambda m: replace(m, kinetic_energy=change(m.kinetic_energy.astype(float)).astype(np.float32))
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        (
+            with_energies(lambda e: 0 * e + 4),
+            r"100.00% of the muons \(5,000 of 5,000\) have the same .* of 4 GeV",
+        ),
+        (
+            with_energies(lambda e: np.where(e < 2, 1.0, 3.0)),
+            "the same kinetic energy of [13] GeV, and 2 energies",
+        ),
+        (with_energies(lambda e: np.maximum(np.round(e), 1)), "have the same kinetic energy of [123] GeV"),
+        (with_energies(lambda e: np.maximum(np.round(e, 1), 0.1)), r"have the same kinetic energy of 0\.\d GeV"),
+        (
+            with_energies(lambda e: np.maximum(e, np.quantile(e, 0.01))),
+            r"1.00% of the muons \(50 of 5,000\) have",
+        ),
+        (
+            with_energies(lambda e: np.minimum(e, np.quantile(e, 0.99))),
+            r"1.00% of the muons \(50 of 5,000\) have",
+        ),
+        (lambda m: m[np.arange(5000) // 10], "90.0% of the 5,000 muons repeat an earlier one, bit by bit"),
+        (lambda m: m[:1], "1 muons are too few to learn from"),
+        (lambda m: m[:50], "50 muons are too few to learn from"),
+    ],
+    ids=["one", "two", "whole GeV", "tenths", "clamped below", "clamped above", "repeated", "1 muon", "50 muons"],
+)
+def test_a_degenerate_sample_is_refused_in_one_line_that_names_it(few, architecture, change, complaint):
+    with pytest.raises(RefusedError, match=complaint) as error:
+        fit_generator(replace(few, muons=change(few.muons)), architecture, seed=1)
+    assert "\n" not in str(error.value)
+
+
+def vertical(muons):
+    zero = np.zeros_like(muons.u)
+    return replace(muons, u=zero, v=zero, w=zero - 1)
+
+
+CUTS = {
+    "above 1 GeV": lambda m: m[m.kinetic_energy > 1],
+    "below 100 GeV": lambda m: m[m.kinetic_energy < 20],
+    "within 60 degrees": lambda m: m[m.cos_zenith > 0.5],
+    "mu- alone": lambda m: m[m.charge < 0],
+    "mu+ alone": lambda m: m[m.charge > 0],
+    "vertical": vertical,
+}
+
+
+@pytest.mark.parametrize("cut", CUTS.values(), ids=CUTS)
+def test_no_muon_of_a_generator_is_where_its_truncated_sample_cannot_be(sample, architecture, cut, tmp_path):
+    cut_sample = replace(sample, muons=cut(sample.muons[:20_000]))
+    fitted = fit_generator(cut_sample, architecture, seed=1, settings=TINY[architecture], progress=False)
+    export_fitted(fitted, tmp_path / "model.onnx")
+    model, truth = Generator.open(file=tmp_path / "model.onnx", device="cpu", threads=1), cut_sample.muons
+    muons = model.sample(300_000, seed=1)
+    if truth.kinetic_energy.min() > 0.9:
+        assert muons.kinetic_energy.min() >= truth.kinetic_energy.min()
+    if truth.kinetic_energy.max() < 21:
+        assert muons.kinetic_energy.max() <= truth.kinetic_energy.max()
+    assert muons.cos_zenith.min() >= (truth.cos_zenith.min() if truth.cos_zenith.min() >= 0.5 else 0)
+    assert set(np.unique(muons.charge)) == set(np.unique(truth.charge))
+    assert any(note.startswith("The training sample is of") for note in fitted.notes)
+
+
+def test_the_support_stands_in_the_metadata(sample, architecture, tmp_path):
+    muons = sample.muons[(sample.muons.cos_zenith > 0.5) & (sample.muons.charge < 0)][:10_000]
+    fitted = fit_generator(
+        replace(sample, muons=muons), architecture, seed=1, settings=TINY[architecture], progress=False
+    )
+    export_fitted(fitted, tmp_path / "model.onnx")
+    metadata = Generator.open(file=tmp_path / "model.onnx", device="cpu").model.metadata
+    assert float(metadata["zenith_max_deg"]) == pytest.approx(60, abs=0.05)
+    assert metadata["only_charge"] == "-1"
+
+
+def test_what_is_stated_is_kept_and_muons_beyond_it_are_refused(few):
+    top, settings = float(few.muons.kinetic_energy.max()), TINY["quantile"]
+    stated = Stated(energy_max=2 * top, zenith_max=89.9)
+    fitted = fit_generator(few, "quantile", seed=1, settings=settings, stated=stated, progress=False)
+    assert fitted.networks.tails.energy_max == 2 * top
+    with pytest.raises(RefusedError, match=r"kinetic energy of .* GeV, outside of the 5 GeV that were stated; so"):
+        fit_generator(few, "quantile", seed=1, stated=Stated(energy_max=5))
+    with pytest.raises(RefusedError, match=r"has a zenith angle of .* degrees, outside of the 30 degrees"):
+        fit_generator(few, "quantile", seed=1, stated=Stated(zenith_max=30))
+
+
 def turned(muons, strength):
     """Turn muons so that their azimuth phi has the density 1 + strength cos(phi), about."""
     azimuth = np.arctan2(muons.v, muons.u).astype(float)
@@ -159,7 +250,7 @@ def test_an_azimuth_that_is_not_uniform_is_refused(sample):
 
 @pytest.mark.parametrize("d", [-8, 0, 7, 100])
 def test_a_width_that_is_no_multiple_of_eight_is_refused(d):
-    with pytest.raises(RefusedError, match=f"d is {d}, and should be a multiple of 8"):
+    with pytest.raises(RefusedError, match=f"d is {d}, and should be (a multiple of 8|from 8 to)"):
         TransformerSettings(d=d)
 
 

@@ -1,8 +1,12 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 import torch
 
+from deepmuon_runtime.muons import MU_MINUS, MU_PLUS
 from deepmuon_training.energy_transform import EnergyTransform
 from deepmuon_training.learning.charge import fit_charge
 from deepmuon_training.learning.descent import Schedule
@@ -17,6 +21,31 @@ def test_the_probability_of_the_training_charges_is_learned(charge, transform, t
     expected = charge_truth(energy, cos_zenith)
     assert np.std(expected) > 0.06  # what a constant probability would miss
     assert np.sqrt(np.mean((found - expected) ** 2)) < 0.01
+
+
+def generated_share(network, transform, muons):
+    """Mean probability of mu+ that a network gives to muons."""
+    y = torch.from_numpy(transform.pre_tanh(muons.kinetic_energy.astype(float))).float()
+    with torch.no_grad():
+        return torch.sigmoid(network(y, torch.from_numpy(muons.cos_zenith)).double()).mean().item()
+
+
+@pytest.mark.parametrize("steps", [1, 30, 300])
+def test_the_mean_charge_is_that_of_all_the_muons_whatever_validates(transform, truth, steps):
+    muons = truth(20_000, seed=4)
+    last = np.arange(len(muons)) >= 19_000  # these validate, and are of one charge
+    muons = replace(muons, pdg_id=np.where(last, MU_MINUS, muons.pdg_id).astype(np.int8))
+    schedule = Schedule(steps=steps, learning_rate=0.01, averaging=0.998, validate_every=10)
+    network = fit_charge(muons, transform, seed=1, schedule=schedule, progress=False)
+    assert generated_share(network, transform, muons) == pytest.approx(np.mean(muons.charge > 0), abs=1e-6)
+
+
+@pytest.mark.parametrize("pdg_id", [MU_MINUS, MU_PLUS])
+def test_muons_of_one_charge_have_no_other_by_any_chance(transform, truth, pdg_id):
+    muons = truth(5000, seed=5)
+    muons = replace(muons, pdg_id=np.full_like(muons.pdg_id, pdg_id))
+    network = fit_charge(muons, transform, seed=1, progress=False)
+    assert generated_share(network, transform, muons) == (pdg_id == MU_PLUS)
 
 
 def test_muons_beyond_the_ends_of_the_sample_share_their_probability(charge):

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import io
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,11 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from torch import nn
 
 from deepmuon_runtime.errors import FailedError, RefusedError
 from deepmuon_training.learning.checkpoint import fingerprint
 from deepmuon_training.learning.descent import Schedule, fit
+from deepmuon_training.sealed import read_sealed
 
 SCHEDULE = Schedule(steps=60, learning_rate=0.05, weight_decay=0.01, averaging=0.9, validate_every=10)
 
@@ -143,6 +148,20 @@ def test_the_checkpoint_of_another_number_of_threads_is_refused(tmp_path: Path):
         torch.set_num_threads(1)
 
 
+@settings(max_examples=30)
+@given(st.data())
+def test_a_checkpoint_of_which_any_byte_was_changed_is_refused(tmp_path_factory, data: st.DataObject):
+    checkpoint = tmp_path_factory.mktemp("flipped") / "fit.pt"
+    fitted(network(), replace(SCHEDULE, steps=2), checkpoint=checkpoint)
+    content = bytearray(checkpoint.read_bytes())
+    place = data.draw(st.integers(0, len(content) - 1))
+    content[place] ^= data.draw(st.integers(1, 255))
+    checkpoint.write_bytes(content)
+    with pytest.raises(RefusedError, match=r"(is damaged|is no checkpoint of this version).*: remove it") as refusal:
+        fitted(network(), replace(SCHEDULE, steps=2), checkpoint=checkpoint)
+    assert "\n" not in str(refusal.value)
+
+
 @pytest.mark.parametrize("content", [b"", b"no checkpoint", b"PK"])
 def test_a_damaged_checkpoint_is_refused(tmp_path: Path, content: bytes):
     checkpoint = tmp_path / "fit.pt"
@@ -156,8 +175,27 @@ def test_a_slow_fit_is_also_saved_between_two_looks(tmp_path: Path, monkeypatch:
     checkpoint = tmp_path / "fit.pt"
     with pytest.raises(KilledError):
         fitted(network(), loss=killed_after(7), checkpoint=checkpoint)
-    assert 0 < torch.load(checkpoint)["numbers"][0] <= 7
+    assert 0 < read_sealed(checkpoint, "checkpoint", "").pop("numbers")[0] <= 7
     assert same(fitted(network(), checkpoint=checkpoint), fitted(network()))
+
+
+@pytest.mark.parametrize(
+    ("values", "complaint"),
+    [
+        ({"steps": 0}, "steps is 0, and should be from 1 to 100,000,000"),
+        ({"steps": -5}, "steps is -5"),
+        ({"learning_rate": -0.1}, "learning_rate is -0.1, and should be above 0 and at most 1"),
+        ({"learning_rate": float("nan")}, "learning_rate is nan"),
+        ({"averaging": 1.0}, "averaging is 1.0, and should be at least 0 and below 1"),
+        ({"weight_decay": -1e-9}, "weight_decay is -1e-09"),
+        ({"validate_every": 0}, "validate_every is 0"),
+        ({"patience": 0}, "patience is 0"),
+    ],
+)
+def test_a_schedule_that_cannot_be_is_refused(values: dict[str, float], complaint: str):
+    with pytest.raises(RefusedError) as refusal:
+        replace(SCHEDULE, **values)
+    assert complaint in str(refusal.value)
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
@@ -204,13 +242,13 @@ def test_the_last_step_is_looked_at():
     assert len(recorder.averaged) == 3
 
 
-def test_the_validated_weights_are_an_exponential_moving_average():
+def test_the_validated_weights_are_an_exponential_moving_average_that_has_no_part_of_its_start():
     recorder = Recorder()
     fitted(network(), replace(SCHEDULE, validate_every=1), loss=recorder.loss, distance=recorder.distance)
-    average = recorder.weights[1]
+    total, share = torch.zeros_like(recorder.weights[1]), 0.0
     for weight, found in zip(recorder.weights[1:], recorder.averaged, strict=False):
-        average = 0.9 * average + 0.1 * weight
-        torch.testing.assert_close(found, average)
+        total, share = 0.9 * total + 0.1 * weight, 0.9 * share + 0.1
+        torch.testing.assert_close(found, total / share)
 
 
 def test_the_learning_rate_rises_over_a_hundredth_of_the_steps_and_falls_along_a_half_cosine():
@@ -221,9 +259,12 @@ def test_the_learning_rate_rises_over_a_hundredth_of_the_steps_and_falls_along_a
     assert schedule.rate_at(999) == pytest.approx(0, abs=1e-5)
 
 
-def test_progress_shows_steps_loss_distance_and_time_left(capfd: pytest.CaptureFixture[str]):
+def test_progress_shows_steps_loss_distance_and_time_left(monkeypatch: pytest.MonkeyPatch):
+    terminal = io.StringIO()
+    terminal.isatty = lambda: True
+    monkeypatch.setattr(sys, "stderr", terminal)
     fit(network(), loss, distance, SCHEDULE, seed=1, name="energy", progress=True)
-    shown = capfd.readouterr().err
+    shown = terminal.getvalue()
     for part in ("energy:", "60/60", "loss=", "distance=", "<00:00"):
         assert part in shown
 

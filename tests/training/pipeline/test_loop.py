@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import fcntl
+import hashlib
 import json
 import os
 import signal
@@ -20,6 +21,7 @@ import pytest
 from deepmuon_runtime import Generator, check_file, read_attributes, read_muons
 from deepmuon_runtime.errors import FailedError, RefusedError
 from deepmuon_runtime.muons import Muons
+from deepmuon_training.pipeline.checksums import CHECKSUMS
 from deepmuon_training.pipeline.loop import Pipeline, plan
 from deepmuon_training.pipeline.seeds import step_seed
 from deepmuon_training.pipeline.settings import read_pipeline_settings
@@ -110,7 +112,7 @@ def run(folder: Path, said: list[str]) -> Path:
 def contents(run: Path) -> dict[str, object]:
     """The contents of a run's files: bytes, and for muon files all but when and by what command they were made."""
     found: dict[str, object] = {}
-    for path in run.iterdir():
+    for path in {*run.iterdir()} - {run / CHECKSUMS}:
         if path.suffix == ".h5":
             attributes = read_attributes(path)
             attributes = {name: attributes[name] for name in attributes.keys() - {"created", "command_line"}}
@@ -131,7 +133,9 @@ def test_a_run_shows_its_plan_then_each_step_then_is_done(said: list[str], run: 
         assert len(began) == len(ended) == 1
         assert said.index(began[0]) < said.index(ended[0])
     assert said[-3].endswith(" left")  # a fit and an export have been timed by then
-    assert {path.name for path in run.iterdir()} == {*steps, "settings.toml"}
+    assert {path.name for path in run.iterdir()} == {*steps, "settings.toml", CHECKSUMS}
+    sums = dict(line.split("  ")[::-1] for line in (run / CHECKSUMS).read_text().splitlines())
+    assert sums == {name: hashlib.sha256((run / name).read_bytes()).hexdigest() for name in steps}
 
 
 def test_what_a_generator_draws_is_carried_through_the_slab_below_it(folder: Path, run: Path, tmp_path: Path):
@@ -192,6 +196,23 @@ def test_finished_steps_are_not_repeated(folder: Path, run: Path):
     planned(folder, held_out=[folder / "held_out.h5"]).run(lines.append, progress=False)
     assert [line.split()[1] for line in lines] == ["done"] * 7
     assert {path: path.stat().st_mtime_ns for path in run.iterdir()} == times
+
+
+@pytest.mark.parametrize("name", ["quantile-0m.pt", "quantile-0m.onnx", "drawn-0m.h5", "muons-1m.h5", "quantile-1m.pt"])
+def test_a_run_with_a_damaged_file_is_refused_in_one_line_that_says_what_to_do(folder: Path, run: Path, name: str):
+    content = (run / name).read_bytes()
+    damaged = bytearray(content)
+    damaged[len(content) // 2 : len(content) // 2 + 400] = bytes(400)
+    try:
+        (run / name).write_bytes(damaged)
+        code, out, err = command(folder, "tiny.toml", "sea.h5", "--work", "run", "--held-out", "held_out.h5")
+    finally:
+        (run / name).write_bytes(content)
+    assert (code, out) == (2, "")
+    assert err == (
+        f"deepmuon-train: run/{name} is damaged or was changed: it is not what the run wrote; remove it, and it is "
+        "made again\n"
+    )
 
 
 KILLS: dict[str, dict[str, tuple[str, str, int, str]]] = {
@@ -264,6 +285,21 @@ def test_a_direct_plan_carries_each_layers_own_muons(folder: Path):
     assert [layer.carried.name for layer in pipeline.layers[:2]] == ["sea.h5", "muons-1m.h5"]
     assert {step.kind for step in pipeline.layer} == {"fit", "export", "transport"}
     assert not (folder / "nowhere").exists()
+
+
+def test_runs_with_one_stated_time_give_the_same_bytes_in_every_file(folder: Path, tmp_path: Path):
+    environment = {**os.environ, "SOURCE_DATE_EPOCH": "1700000000"}
+    for name in "first", "second":
+        (tmp_path / name).mkdir()
+        for file in "tiny.toml", "sea.h5":
+            (tmp_path / name / file).symlink_to(folder / file)
+        words = [COMMAND, "pipeline", "tiny.toml", "sea.h5", "--work", "run", "-q"]
+        subprocess.run(words, cwd=tmp_path / name, env=environment, check=True, capture_output=True)
+    first, second = (
+        {path.name: path.read_bytes() for path in (tmp_path / n / "run").iterdir()} for n in ("first", "second")
+    )
+    assert first == second
+    assert read_attributes(tmp_path / "first/run/drawn-0m.h5")["created"] == "2023-11-14T22:13:20+00:00"
 
 
 def test_an_unknown_key_ends_the_command_with_exit_code_2_and_one_line(folder: Path):

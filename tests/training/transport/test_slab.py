@@ -166,15 +166,32 @@ def test_a_sample_of_which_nothing_arrives_ends_empty() -> None:
     found = transport(sample_of(0.5, n=10), 10.0, seed=1, progress=False)
     assert (len(found.sample), found.screened) == (0, 10)
     assert (found.surviving_fraction, found.sample.rate) == (0, 0)
+    assert found.surviving_fraction_interval == (0, pytest.approx(1 - 0.15865**0.1))
+
+
+def test_a_sample_of_which_all_arrives_leaves_open_whether_all_do() -> None:
+    found = transport(sample_of(100.0, n=20), 0.01, seed=1, progress=False)
+    assert found.surviving_fraction == 1
+    assert found.surviving_fraction_interval == (pytest.approx(0.15865 ** (1 / 20)), 1)
+    assert found.sample.rate_uncertainty > 0
+
+
+def clopper_pearson(survived: int, started: int) -> tuple[float, float]:
+    """The interval in the words of beta functions: which fractions have 15.865 % on each side."""
+    low = stats.beta.ppf(0.15865, survived, started - survived + 1)
+    return float(low), float(stats.beta.ppf(1 - 0.15865, survived + 1, started - survived))
 
 
 def test_the_survivors_carry_rate_depth_and_provenance() -> None:
     before = power_law_sample(5000, 1.0, seed=12)
     found = transport(before, 4.0, seed=16, progress=False)
     after, fraction = found.sample, len(found.sample) / 5000
-    error = math.sqrt(fraction * (1 - fraction) / 5000)
+    low, high = clopper_pearson(len(after), 5000)
+    error = (high - low) / 2
+    assert error == pytest.approx(math.sqrt(fraction * (1 - fraction) / 5000), rel=0.03)
     assert (after.depth_m, after.medium, after.smoothed, after.source) == (4.0, "G4_WATER", True, "test")
     assert found.surviving_fraction == fraction
+    assert found.surviving_fraction_interval == pytest.approx((low, high))
     assert found.surviving_fraction_error == pytest.approx(error)
     assert after.rate == pytest.approx(100 * fraction)
     assert after.rate_uncertainty == pytest.approx(100 * fraction * math.hypot(2 / 100, error / fraction))

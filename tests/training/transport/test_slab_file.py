@@ -59,7 +59,8 @@ def test_the_survivors_are_those_of_the_parts_each_with_its_own_seed(upper: Path
     fraction = len(expected) / MUONS
     assert 0.2 < fraction < 0.8
     assert found.rate == pytest.approx(100 * fraction)
-    assert found.rate_uncertainty == pytest.approx(np.hypot(fraction, 100 * np.sqrt(fraction * (1 - fraction) / MUONS)))
+    binomial = np.sqrt(fraction * (1 - fraction) / MUONS)  # which the exact interval is a little wider than
+    assert found.rate_uncertainty == pytest.approx(np.hypot(fraction, 100 * binomial), rel=0.02)
     assert (found.depth_m, found.source, found.smoothed) == (3.0, "test", True)
     assert found.provenance[0] == "made"
     assert f"seed 1, in parts of 2000: {len(expected)} of 5000 survived" in found.provenance[1]
@@ -88,7 +89,7 @@ def test_an_interrupted_transport_carries_only_the_missing_parts_and_ends_with_t
 
 
 def test_a_transport_that_nothing_survives_is_an_error(upper: Path) -> None:
-    with pytest.raises(FailedError, match="none of 5000 muons survived 100 m of G4_WATER"):
+    with pytest.raises(FailedError, match="none of 5,000 muons survived 100 m of G4_WATER"):
         transport_file(
             upper,
             upper.with_name("lower.h5"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,31 +13,30 @@ import click
 from deepmuon_cli.options.quantities import number_from_zero, positive_number, seed_number
 
 if TYPE_CHECKING:  # the libraries are imported when they are needed: --help is answered at once
-    from deepmuon_training.data.muon_table import Columns
+    from deepmuon_training.data.foreign.table import Table
     from deepmuon_training.sample import Sample
 
 __all__ = ["command"]
 
 FILE = click.Path(path_type=Path)
 
-FORMATS = ("cry-text", "cry-hdf5", "csv", "npy")
+UNITS = ("eV", "keV", "MeV", "GeV", "TeV", "PeV")
 
-KNOWN_OF_CRY = ("columns", "units", "depth", "medium")
+FORMATS = ("cry-text", "cry-hdf5", "csv", "npy", "mcpl", "root")
+
+KNOWN_OF_CRY = ("columns", "units", "angles", "muons_only", "depth", "medium")
 KNOWN = {
     "cry-text": KNOWN_OF_CRY,
     "cry-hdf5": (*KNOWN_OF_CRY, "source", "charge", "rate", "rate_uncertainty", "live_time", "area"),
-    "csv": (),
-    "npy": (),
 }
-"""Options that have their answer in each format."""
+"""Options that have their answer in a format."""
 
 NEEDED = {
     "cry-text": ("charge", "smooth"),
     "cry-hdf5": ("smooth",),
-    "csv": ("columns", "units"),
-    "npy": ("columns", "units"),
+    "npy": ("columns",),
 }
-"""Options without which each format is not understood."""
+"""Options without which a format is not understood; what headings leave open is asked for when they are read."""
 
 
 def charge_ratio(text: str) -> float:
@@ -58,10 +58,12 @@ def charge_ratio(text: str) -> float:
 @click.argument("input_file", type=FILE, metavar="INPUT")
 @click.option("-o", "--output", type=FILE, metavar="FILE", required=True, help="The HDF5 file to be written.")
 @click.option("--format", "form", type=click.Choice(FORMATS), required=True, help="What INPUT is; see below.")
-@click.option("--columns", metavar="NAMES", help="What the columns of a csv or npy are: E,u,v,w,charge.")
-@click.option("--units", type=click.Choice(("MeV", "GeV")), help="Unit of the energy in a csv or npy.")
+@click.option("--columns", metavar="NAMES", help="What the columns of a table are: E,u,v,w,charge.")
+@click.option("--units", type=click.Choice(UNITS), help="Unit of energies and momenta, where no heading says it.")
+@click.option("--angles", type=click.Choice(("deg", "rad")), help="Unit of angles, where no heading says it.")
+@click.option("--muons-only", is_flag=True, default=None, help="Leave other particles out, and count them.")
 @click.option("--charge", type=charge_ratio, metavar="-1|+1|RATIO", help="mu-, mu+, or how many mu+ for each mu-.")
-@click.option("--seed", type=seed_number, metavar="SEED", help="For --charge RATIO; a new one if left out.")
+@click.option("--seed", type=seed_number, metavar="SEED", help="For --charge RATIO and weights; a new one if left out.")
 @click.option("--rate", type=positive_number, metavar="HZ", help="Their rate per m2, of 1 MeV and more.")
 @click.option("--rate-uncertainty", type=number_from_zero, metavar="HZ", help="Standard uncertainty of --rate.")
 @click.option(
@@ -87,6 +89,8 @@ def command(input_file: Path, output: Path, form: str, overwrite: bool, quiet: b
         $ echo 830,0,0.5 >> m.csv
         $ deepmuon-train convert m.csv --format csv --columns E,u,v --units MeV --charge -1 -o m.h5
         m.h5: 2 muons, 0 mu+ and 2 mu-, mean kinetic energy 1.49 GeV, rate unknown
+            m.csv, columns E [MeV], u, v: 2 rows
+            charge stated: all mu-
 
     Formats:
 
@@ -94,20 +98,32 @@ def command(input_file: Path, output: Path, form: str, overwrite: bool, quiet: b
         cry-text  shower.out of CRY's program testOut at altitude 0; its muons only
         cry-hdf5  /muons/{kinetic_energy, u, v, w, charge}, MeV, and the attributes
                   rate_hz_per_m2 and source
-        csv       numbers with commas, or else blanks or tabs, between them
+        csv       numbers with commas, semicolons, tabs or blanks between them; what
+                  deepmuon-csv wrote
         npy       floating-point numbers of NumPy, one row for each muon
+        mcpl      MCPL; needs pip install 'deepmuon-training[mcpl]'
+        root      a tree of ROOT, muons.root or muons.root:tree; its columns are its
+                  branches; needs pip install 'deepmuon-training[root]'
 
-    Columns of a csv or npy, in their order:
+    Text may be packed by gzip. One heading, comments (#) and blank lines are passed over; any other line that is no row
+    is named. Headings that are plain need no --columns, and units in them no --units. Columns in their order are
+    E,u,v; by their headings, E=Ekin,u=dirX,v=dirY. They are
 
     \b
-        E         kinetic energy, in --units
+        E         kinetic energy; or Etot, total energy; or p, momentum
         u, v, w   direction of motion, a unit vector, z up: w is negative.
                   Without w, it follows from u and v
         -u -v -w  the opposite: -w where the z axis points down, all three where
                   the vector points to where the muon comes from
-        charge    -1 or +1
-        pdg_id    13 or -13
-        skip      anything else
+        px py pz  momentum, in place of E, u, v, w; or -px, -py, -pz
+        theta phi direction of motion, z up: theta is above 90 degrees
+        zenith azimuth, or cos_zenith azimuth
+                  where the muon comes from; zenith,phi and theta,azimuth are
+                  possible, too
+        charge    -1 or +1; or a particle's number, of which mu- and mu+ are
+                  pdg_id 13, -13; corsika_id 6, 5; musun_id 11, 10; phits_id 7, 6
+        weight    the muons are drawn by it, and weigh the same afterwards
+        skip      anything else, text too
 
     Nothing is guessed: where the format has no charge, --charge is asked for, and a rate that is not stated stays
     unknown. Muons below 1 MeV are dropped; any other line or row that can't be a muon is named, and nothing is
@@ -116,29 +132,32 @@ def command(input_file: Path, output: Path, form: str, overwrite: bool, quiet: b
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime import new_seed
     from deepmuon_runtime.files.output import check_output
+    from deepmuon_runtime.muon_file.writer import write_muons
     from deepmuon_training.data.conversion import draw_charges
-    from deepmuon_training.sample import write_sample
+    from deepmuon_training.data.foreign.root_table import file_of
 
     _check_options(form, stated)
-    check_output(output, overwrite)
-    sample = _smoothed(_read(input_file, form, stated), stated["smooth"])
+    check_output(output, overwrite, [file_of(input_file) if form == "root" else input_file])
+    stated["seed"] = new_seed() if stated["seed"] is None else stated["seed"]
+    sample, exposure = _read(input_file, form, stated)
+    sample = _smoothed(sample, stated["smooth"])
     if stated["charge"] is not None:
-        sample = draw_charges(sample, stated["charge"], new_seed() if stated["seed"] is None else stated["seed"])
-    write_sample(output, sample, overwrite=overwrite)
+        sample = draw_charges(sample, stated["charge"], stated["seed"])
+    write_muons(output, sample.muons, {**sample.attributes, **exposure}, overwrite=overwrite)
     if not quiet:
         click.echo(f"{output}: {_summary(sample)}")
+        for line in sample.provenance:
+            click.echo(f"    {line}")
 
 
 def _check_options(form: str, stated: dict[str, Any]) -> None:
     """Refuse options that contradict each other, before anything is read."""
-    for name in KNOWN[form]:
+    for name in KNOWN.get(form, ()):
         if stated[name] is not None:
             raise click.UsageError(f"{_option(name)} goes without --format {form}, which knows it")
-    for name in NEEDED[form]:
+    for name in NEEDED.get(form, ()):
         if stated[name] is None:
             raise click.UsageError(f"--format {form} does not say it: give {_option(name)}")
-    if form in ("csv", "npy") and _columns(stated).has_charge != (stated["charge"] is None):
-        raise click.UsageError("the charge: give either a column charge or pdg_id, or --charge -1, +1 or RATIO")
     if (stated["live_time"] is None) != (stated["area"] is None):
         raise click.UsageError("--live-time and --area go together")
     if stated["rate"] is not None and stated["live_time"] is not None:
@@ -155,35 +174,71 @@ def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def _columns(stated: dict[str, Any]) -> Columns:
-    from deepmuon_training.data.muon_table import Columns
-
-    return Columns([name.strip() for name in stated["columns"].split(",")], stated["units"])
-
-
-def _read(path: Path, form: str, stated: dict[str, Any]) -> Sample:
-    """Read the muons, with what is known of them."""
-    from deepmuon_training.data.conversion import sample_of
+def _read(path: Path, form: str, stated: dict[str, Any]) -> tuple[Sample, dict[str, float]]:
+    """Read the muons, with what is known of them, and the live time on an area that they stand for, where it is."""
+    from deepmuon_training.data.conversion import drop_lowest
     from deepmuon_training.data.cry import read_cry
     from deepmuon_training.data.cry_text import read_cry_text
-    from deepmuon_training.data.muon_table import read_csv, read_npy
+    from deepmuon_training.sample import Sample
 
     if form == "cry-hdf5":
-        return read_cry(path)
+        return read_cry(path), {}
     if form == "cry-text":
         muons, _, count_variance = read_cry_text(path)
-        sample = sample_of(muons, f"{path.name}, CRY's text output", source=stated["source"] or "CRY")
-        return _with_rate(sample, stated, count_variance)
-    columns = _columns(stated)
-    muons = (read_csv if form == "csv" else read_npy)(path, columns)
-    sample = sample_of(
-        muons,
-        f"{path.name}, columns {columns}",
-        source=stated["source"] or path.name,
-        depth_m=stated["depth"] or 0.0,
-        medium=stated["medium"] or "G4_WATER",
-    )
-    return _with_rate(sample, stated)
+        told = f"{path.name}, CRY's text output: {len(muons):,} muons"
+        sample = Sample(muons, depth_m=0.0, source=stated["source"] or "CRY", provenance=(told,))
+        return _with_rate(drop_lowest(sample, "MeV"), stated, count_variance), {}
+    return _read_table(path, form, stated)
+
+
+def _read_table(path: Path, form: str, stated: dict[str, Any]) -> tuple[Sample, dict[str, float]]:
+    from deepmuon_training.data.conversion import drop_lowest, unweighted
+    from deepmuon_training.data.foreign.headings import columns_of
+    from deepmuon_training.data.foreign.notes import EXPOSURE, check_stated, known_of, of_all_rows
+    from deepmuon_training.data.foreign.reading import read_foreign
+    from deepmuon_training.sample import sample_of
+
+    table = _opened(path, form, stated["columns"])
+    columns = columns_of(table, stated["columns"], stated["units"], stated["angles"])
+    if columns.has_charge != (stated["charge"] is None):
+        raise click.UsageError("the charge: give either a column charge or pdg_id, or --charge -1, +1 or RATIO")
+    if stated["muons_only"] and columns.id_kind is None:
+        raise click.UsageError("--muons-only goes with a column pdg_id, corsika_id, musun_id or phits_id")
+    if columns.has_weight and stated["live_time"] is not None:
+        raise click.UsageError("--live-time counts muons, which a column weight says do not count alike: --rate")
+    known = known_of(table)
+    found = read_foreign(table, columns, muons_only=bool(stated["muons_only"]))
+    known = of_all_rows(table, known, found.rows)
+    check_stated(table, known, stated)
+    for doubt in columns.doubts(found.muons):
+        warnings.warn(doubt, stacklevel=2)
+    rows = f"{found.rows:,} row{'s' * (found.rows > 1)}"
+    muons, told = found.muons, [f"{path.name}, columns {columns}: {rows}", *found.left_out]
+    if found.weights is not None:
+        muons, how = unweighted(muons, found.weights, stated["seed"])
+        told.append(how)
+    attributes = {
+        "depth_m": stated["depth"] or 0.0,
+        "medium": stated["medium"] or "G4_WATER",
+        "created_by": path.name,
+        **known,
+        **({} if stated["source"] is None else {"source": stated["source"]}),
+        "provenance": [*known.get("provenance", ()), *told],
+    }
+    sample = drop_lowest(sample_of(muons, attributes), columns.unit)
+    return _with_rate(sample, stated), {name: known[name] for name in EXPOSURE if name in known}
+
+
+def _opened(path: Path, form: str, names: str | None) -> Table:
+    """Open a table; text has as many columns as --columns names in their order."""
+    from deepmuon_training.data.foreign.mcpl_table import open_mcpl
+    from deepmuon_training.data.foreign.npy_table import open_npy
+    from deepmuon_training.data.foreign.root_table import open_root
+    from deepmuon_training.data.foreign.text_table import open_text
+
+    if form == "csv":
+        return open_text(path, None if names is None or "=" in names else names.count(",") + 1)
+    return {"npy": open_npy, "mcpl": open_mcpl, "root": open_root}[form](path)
 
 
 def _with_rate(sample: Sample, stated: dict[str, Any], count_variance: float = 1.0) -> Sample:

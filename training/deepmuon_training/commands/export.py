@@ -33,7 +33,7 @@ def command(generator: Path, output: Path, overwrite: bool, quiet: bool) -> None
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime.files.output import check_output
 
-    check_output(output, overwrite)
+    check_output(output, overwrite, [generator])
 
     from deepmuon_training.generators.fitted import FittedGenerator, export_fitted
 

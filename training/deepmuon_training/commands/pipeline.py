@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -74,7 +73,7 @@ def command(settings: Path, sample: Path, work: Path, held_out: tuple[Path, ...]
 
     chosen = read_pipeline_settings(settings)
     pipeline = plan(replace(chosen, direct=chosen.direct or direct), sample, work, held_out)
-    pipeline.run((lambda line: None) if quiet else click.echo, progress=not quiet and sys.stderr.isatty())
+    pipeline.run((lambda line: None) if quiet else click.echo, progress=not quiet)
     table = rows(pipeline.layers)
     write_whole(work / "layers.csv", as_csv(table).encode(), overwrite=True)
     click.echo(as_text(table))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -58,7 +57,7 @@ def command(
     \b
         $ deepmuon-train source -n 1e4 --seed 1 -q -o sea_level.h5
         $ deepmuon-train transport sea_level.h5 --thickness 10 --seed 1 -o below.h5
-        below.h5: 4,005 of 10,000 muons (40.05% +- 0.49%) under 10 m of G4_WATER, 51.68 muons per m2 and s, seed 1
+        below.h5: 4,005 of 10,000 muons (40.05%, 39.56% to 40.55%) under 10 m of G4_WATER, 51.68 per m2 and s, seed 1
              5,357 can't arrive: not carried
                638 stopped or decayed
 
@@ -71,13 +70,16 @@ def command(
     Standard rock has Z = 11, A = 22 and, unless another is stated, 2.65 g/cm3. In a finite world the muons start at
     places uniform over its upper face, and those that leave it by its sides are lost. The same muons and seed give the
     same survivors for any --processes. Muons that have a depth already can go on only in the material above them.
+    The interval of the surviving fraction is exact (Clopper and Pearson), at 68 % confidence. Where no muon survives
+    nothing is written.
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime import new_seed
     from deepmuon_runtime.files.output import check_output
     from deepmuon_training.sample import read_sample, write_sample
-    from deepmuon_training.transport.slab import transport
+    from deepmuon_training.transport.material import medium
+    from deepmuon_training.transport.slab import refuse_none, transport
 
-    check_output(output, overwrite)
+    check_output(output, overwrite, [muons])
     seed = new_seed() if seed is None else seed
     carried = transport(
         read_sample(muons),
@@ -87,8 +89,9 @@ def command(
         material=material,
         density=density,
         box=box,
-        progress=not quiet and sys.stderr.isatty(),
+        progress=not quiet,
     )
+    refuse_none(len(carried.sample), carried.started, thickness, medium(material, density))
     write_sample(output, carried.sample, overwrite=overwrite)
     if not quiet:
         click.echo(_closing_lines(output, carried, seed))
@@ -96,8 +99,9 @@ def command(
 
 def _closing_lines(output: Path, carried: Transported, seed: int) -> str:
     sample = carried.sample
-    fraction = f"{carried.surviving_fraction:.2%} +- {carried.surviving_fraction_error:.2%}"
-    rate = "rate unknown" if sample.rate is None else f"{sample.rate:.4g} muons per m2 and s"
+    low, high = carried.surviving_fraction_interval
+    fraction = f"{carried.surviving_fraction:.2%}, {low:.2%} to {high:.2%}"
+    rate = "rate unknown" if sample.rate is None else f"{sample.rate:.4g} per m2 and s"
     fates = {
         "can't arrive: not carried": carried.screened,
         "stopped or decayed": carried.stopped,

@@ -15,15 +15,14 @@ from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import Muons
-from deepmuon_training.data.foreign_muons import CHARGE_UNKNOWN, foreign_muons
-from deepmuon_training.data.number_lines import read_number_lines
+from deepmuon_training.data.foreign.muons import CHARGE_UNKNOWN, foreign_muons
+from deepmuon_training.data.foreign.table import Float, Place
+from deepmuon_training.data.foreign.text_table import open_text
 
 __all__ = ["CryText", "read_cry_text"]
 
 COLUMNS = 10
 MUON, LAST_ID = 4, 6
-
-Float = NDArray[np.float64]
 
 
 class CryText(NamedTuple):
@@ -55,10 +54,10 @@ def read_cry_text(path: str | Path) -> CryText:
         If the file can't be read, was cut off, has a line that is not CRY's, or no muon.
     """
     parts, events, particles = [], [], 0
-    for first, numbers in read_number_lines(path, COLUMNS, ends_with_newline=True):
-        _refuse_other_lines(path, first, numbers)
+    for place, numbers in open_text(path, COLUMNS, ends_with_newline=True).rows(range(COLUMNS)):
+        _refuse_other_lines(place, numbers)
         rows = np.flatnonzero(numbers[:, 2] == MUON)
-        parts.append(_muons(path, first + rows, numbers[rows]))
+        parts.append(_muons(place, rows, numbers[rows]))
         events.append(numbers[rows, 0])
         particles += len(numbers)
     muons = Muons.concatenate(parts)
@@ -67,7 +66,7 @@ def read_cry_text(path: str | Path) -> CryText:
     return CryText(muons, particles, _count_variance(np.concatenate(events)))
 
 
-def _refuse_other_lines(path: str | Path, first: int, numbers: Float) -> None:
+def _refuse_other_lines(place: Place, numbers: Float) -> None:
     """Refuse ten numbers that do not begin with an event, a secondary and a particle id."""
     whole = numbers[:, :3]
     bad = ~((whole >= 0) & (whole == np.floor(whole))).all(axis=1) | (whole[:, 2] > LAST_ID)
@@ -75,16 +74,13 @@ def _refuse_other_lines(path: str | Path, first: int, numbers: Float) -> None:
         row = int(np.argmax(bad))
         shown = " ".join(f"{number:g}" for number in whole[row])
         raise RefusedError(
-            f"{path}, line {first + row} is not CRY's: it begins with {shown}, not with an event, a secondary and a "
+            f"{place(row)} is not CRY's: it begins with {shown}, not with an event, a secondary and a "
             f"particle id from 0 to {LAST_ID}"
         )
 
 
-def _muons(path: str | Path, lines: NDArray[np.int64], numbers: Float) -> Muons:
-    def place(index: int) -> str:
-        return f"{path}, line {lines[index]}: the muon"
-
-    return foreign_muons(1e-3 * numbers[:, 3], numbers[:, 7:], CHARGE_UNKNOWN, place)
+def _muons(place: Place, rows: NDArray[np.intp], numbers: Float) -> Muons:
+    return foreign_muons(1e-3 * numbers[:, 3], numbers[:, 7:], CHARGE_UNKNOWN, lambda index: place(int(rows[index])))
 
 
 def _count_variance(events: Float) -> float:

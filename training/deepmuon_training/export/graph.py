@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,9 @@ class Graph:
     """A graph under construction; a value is known by its name, a string.
 
     Calling the graph adds a node: ``y = graph("Mul", x, 2.0)``. Numbers and arrays become constants, numbers as
-    float32. Names are counted, so that the same calls give the same bytes.
+    float32. Names are counted, so that the same calls give the same bytes. Every node has a name of its own: ONNX
+    Runtime 1.19 to 1.21 refuse graphs in which they fuse nodes without names. What a node is for is said before
+    its operator: ``with graph.scope("energy"):`` gives ``energy/Mul_7``.
 
     Attributes
     ----------
@@ -37,6 +40,16 @@ class Graph:
         self.nodes: list[onnx.NodeProto] = []
         self.initializers: list[onnx.TensorProto] = []
         self._constants: dict[tuple[str, tuple[int, ...], bytes], str] = {}
+        self._scope = ""
+
+    @contextmanager
+    def scope(self, name: str) -> Iterator[None]:
+        """Let the names of the nodes that are added begin with this, and a slash; scopes may be nested."""
+        outer, self._scope = self._scope, f"{self._scope}{name}/"
+        try:
+            yield
+        finally:
+            self._scope = outer
 
     def __call__(self, operator: str, *inputs: str | float | NDArray[Any], **attributes: Any) -> str:
         """Add a node of one output and return the output's name."""
@@ -44,17 +57,18 @@ class Graph:
 
     def several(self, operator: str, outputs: int, *inputs: str | float | NDArray[Any], **attributes: Any) -> list[str]:
         """Add a node of several outputs and return their names."""
-        names = [f"{operator}_{len(self.nodes)}" + (f"_{k}" if outputs > 1 else "") for k in range(outputs)]
+        name = f"{operator}_{len(self.nodes)}"
+        names = [f"{name}_{k}" for k in range(outputs)] if outputs > 1 else [name]
         sources = [value if isinstance(value, str) else self.constant(value) for value in inputs]
-        self.nodes.append(helper.make_node(operator, sources, names, **attributes))
+        self.nodes.append(helper.make_node(operator, sources, names, name=self._scope + name, **attributes))
         return names
 
-    def constant(self, value: float | NDArray[Any]) -> str:
-        """Return the name of a constant; equal ones are stored once."""
+    def constant(self, value: float | NDArray[Any], name: str | None = None) -> str:
+        """Return the name of a constant; equal ones are stored once, under the name that the first was given."""
         array = np.asarray(value, dtype=np.float32) if isinstance(value, float | int) else np.asarray(value)
         key = array.dtype.str, array.shape, array.tobytes()
         if key not in self._constants:
-            self._constants[key] = f"constant_{len(self._constants)}"
+            self._constants[key] = name or f"constant_{len(self._constants)}"
             self.initializers.append(numpy_helper.from_array(array, self._constants[key]))
         return self._constants[key]
 
@@ -81,7 +95,7 @@ class Graph:
             If it is no valid model, or its types and shapes do not fit together.
         """
         for name, (value, _, _) in outputs.items():
-            self.nodes.append(helper.make_node("Identity", [value], [name]))
+            self.nodes.append(helper.make_node("Identity", [value], [name], name=f"output/{name}"))
         graph = helper.make_graph(
             self.nodes,
             "deepmuon",

@@ -27,6 +27,10 @@ class Training:
         How many.
     seed
         Of weights and batches.
+    zenith_max_deg
+        Largest zenith angle of its muons; None where that is the horizon.
+    charge
+        The one that all have; None where both are.
     """
 
     depth_m: float
@@ -38,12 +42,15 @@ class Training:
     smoothed: bool | None
     muons: int
     seed: int
+    zenith_max_deg: float | None = None
+    charge: int | None = None
 
     @classmethod
-    def of(cls, sample: Sample, seed: int) -> Training:
+    def of(cls, sample: Sample, seed: int, *, zenith_max: float = 90.0, charge: int | None = None) -> Training:
         """Note what a sample is, without its muons."""
-        alike = {f.name: getattr(sample, f.name) for f in fields(cls) if f.name not in ("muons", "seed")}
-        return cls(**alike, muons=len(sample), seed=seed)
+        alike = {f.name: getattr(sample, f.name) for f in fields(cls) if hasattr(sample, f.name) and f.name != "muons"}
+        limit = zenith_max if zenith_max < 90 else None
+        return cls(**alike, muons=len(sample), seed=seed, zenith_max_deg=limit, charge=charge)
 
 
 def metadata(generator: Exportable, training: Training) -> dict[str, str]:
@@ -57,6 +64,8 @@ def metadata(generator: Exportable, training: Training) -> dict[str, str]:
         "latent_size": generator.latent_size,
         "energy_min_gev": generator.energy_range[0],  # all digits: a muon that the graph clips is within
         "energy_max_gev": generator.energy_range[1],
+        "zenith_max_deg": None if training.zenith_max_deg is None else f"{training.zenith_max_deg:.6g}",
+        "only_charge": None if training.charge is None else f"{training.charge:+d}",
         "created_by": f"deepmuon-training {version('deepmuon-training')}",
         "licence": LICENCE,
         "rate_hz_per_m2": None if training.rate is None else f"{training.rate:.6g}",

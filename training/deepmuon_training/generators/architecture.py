@@ -9,6 +9,7 @@ from typing import Any, Generic, Literal, TypeVar
 
 from deepmuon_training.export.exportable import Exportable
 from deepmuon_training.export.stored import StoredGenerator
+from deepmuon_training.learning.support import Support
 from deepmuon_training.sample import Sample
 
 __all__ = ["Architecture", "Azimuth", "Fit"]
@@ -55,6 +56,16 @@ class Architecture(ABC, Generic[Settings, Networks]):
     settings: type[Settings]
     checkpoints: tuple[str, ...]
 
+    def check_azimuth(self, azimuth: Azimuth) -> None:
+        """Refuse a choice of the azimuth that this architecture does not leave; "uniform" stands for none.
+
+        Raises
+        ------
+        RefusedError
+            If there is no such choice.
+        """
+        return
+
     @abstractmethod
     def fit(
         self,
@@ -63,10 +74,14 @@ class Architecture(ABC, Generic[Settings, Networks]):
         *,
         seed: int,
         azimuth: Azimuth,
+        support: Support,
         checkpoint_folder: Path | None,
         progress: bool,
     ) -> Fit[Networks]:
-        """Fit networks to a sample; the parameters are those of `deepmuon_training.generators.fit.fit_generator`."""
+        """Fit networks to a sample, muons of which are nowhere but in the support.
+
+        The other parameters are those of `deepmuon_training.generators.fit.fit_generator`.
+        """
 
     @abstractmethod
     def pack(self, networks: Networks) -> dict[str, Any]:

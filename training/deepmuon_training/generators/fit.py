@@ -12,6 +12,8 @@ from deepmuon_training.export.metadata import Training
 from deepmuon_training.generators.architecture import Azimuth
 from deepmuon_training.generators.fitted import FittedGenerator
 from deepmuon_training.generators.registry import architecture
+from deepmuon_training.learning.degenerate import check_repeats, check_ties
+from deepmuon_training.learning.support import Stated, Support
 from deepmuon_training.learning.threads import one_thread
 from deepmuon_training.sample import Sample
 
@@ -29,6 +31,7 @@ def fit_generator(
     seed: int,
     settings: Any = None,
     azimuth: Azimuth = "uniform",
+    stated: Stated | None = None,
     checkpoint_folder: Path | None = None,
     progress: bool = True,
 ) -> FittedGenerator:
@@ -46,7 +49,10 @@ def fit_generator(
         How long to train, the `settings` of its `deepmuon_training.generators.architecture.Architecture`; their default
         made the released models.
     azimuth
-        Of a `quantile` generator: "uniform", where that is so, or "learned". A `transformer` always learns it.
+        Of a `quantile` generator: "uniform", where that is so, or "learned". A `transformer` always learns it, and
+        leaves no choice.
+    stated
+        Where the sample ends, if that is known; what is not, its muons tell (`deepmuon_training.learning.support`).
     checkpoint_folder
         Existing folder for checkpoints, from which an interrupted fit of the same sample goes on.
     progress
@@ -55,17 +61,28 @@ def fit_generator(
     Raises
     ------
     RefusedError
-        If the sample can't be learned (`check_sample`), its azimuth is to be uniform and is not, or a checkpoint is
-        of another sample, seed or settings.
+        If the sample can't be learned (`check_sample`), has muons outside of what is stated, its azimuth is to be
+        uniform and is not, or a checkpoint is of another sample, seed or settings.
     FailedError
         If the training diverges.
     """
     kind = architecture(name)
+    kind.check_azimuth(azimuth)
     check_sample(sample)
     settings = settings or kind.settings()
-    fit = kind.fit(sample, settings, seed=seed, azimuth=azimuth, checkpoint_folder=checkpoint_folder, progress=progress)
-    training = Training.of(sample, seed)
-    return FittedGenerator(name, fit.networks, training, asdict(settings), fit.notes, fit.unphysical_before_mapping)
+    support = Support.of(sample.muons, stated)
+    fit = kind.fit(
+        sample,
+        settings,
+        seed=seed,
+        azimuth=azimuth,
+        support=support,
+        checkpoint_folder=checkpoint_folder,
+        progress=progress,
+    )
+    training = Training.of(sample, seed, zenith_max=support.zenith_max, charge=support.charge)
+    notes = (*([support.note] if support.note else []), *fit.notes)
+    return FittedGenerator(name, fit.networks, training, asdict(settings), notes, fit.unphysical_before_mapping)
 
 
 def check_sample(sample: Sample) -> None:
@@ -75,10 +92,12 @@ def check_sample(sample: Sample) -> None:
     ------
     RefusedError
         If it has too few muons, or one that can't be: not downward, no unit vector, no number, or with a kinetic energy
-        out of 1 MeV to 100 TeV.
+        out of 1 MeV to 100 TeV; if muons repeat one another, or many have the same energy.
     """
     if len(sample) < FEWEST_MUONS:
         raise RefusedError(f"{len(sample)} muons are too few to learn from: at least {FEWEST_MUONS} are needed")
     bad = first_unphysical(sample.muons, LOWEST_ENERGY, HIGHEST_ENERGY)
     if bad is not None:
         raise RefusedError(f"the sample can't be learned: muon number {bad[0]} {bad[1]}")
+    check_repeats(sample.muons)
+    check_ties(sample.muons)

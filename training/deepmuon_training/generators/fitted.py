@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import io
-import pickle
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import torch
-
-from deepmuon_runtime.errors import RefusedError, reason
+from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.files.whole import write_whole
 from deepmuon_training.export.metadata import Training
 from deepmuon_training.export.onnx_export import Mismatch, export
 from deepmuon_training.generators.registry import architecture
 from deepmuon_training.learning.threads import one_thread
 from deepmuon_training.records import from_json, to_json
+from deepmuon_training.sealed import read_sealed, seal
 
 __all__ = ["Exported", "FittedGenerator", "export_fitted"]
 
-_FORMAT, _FORMAT_VERSION = "deepmuon-generator", 1
+_FORMAT, _FORMAT_VERSION = "deepmuon-generator", 2
 
 
 @dataclass(frozen=True)
@@ -58,7 +55,6 @@ class FittedGenerator:
         RefusedError, FailedError
             As `deepmuon_runtime.files.whole.write_whole`.
         """
-        contents = io.BytesIO()
         parts = {
             "format": _FORMAT,
             "format_version": _FORMAT_VERSION,
@@ -69,8 +65,7 @@ class FittedGenerator:
             "notes": self.notes,
             "unphysical_before_mapping": self.unphysical_before_mapping,
         }
-        torch.save(parts, contents)
-        write_whole(path, contents.getvalue(), overwrite=overwrite)
+        write_whole(path, seal(parts), overwrite=overwrite)
 
     @classmethod
     def load(cls, path: str | Path) -> FittedGenerator:
@@ -79,16 +74,13 @@ class FittedGenerator:
         Raises
         ------
         RefusedError
-            If the file can't be read, or is none of this version.
+            If the file can't be read, is damaged, or none of this version.
         """
-        try:
-            parts = torch.load(path, weights_only=True)
-            if parts["format"] != _FORMAT:
-                raise KeyError(_FORMAT)
-            version = parts["format_version"]
-        except (OSError, RuntimeError, pickle.UnpicklingError, EOFError, LookupError, TypeError, ValueError) as error:
-            why = f": {reason(error)}" if isinstance(error, OSError) else ""
-            raise RefusedError(f"{path} is no generator that deepmuon-train fit wrote{why}") from error
+        what, instead = "generator that deepmuon-train fit wrote", "fit it again"
+        parts = read_sealed(Path(path), what, instead)
+        if parts.get("format") != _FORMAT:
+            raise RefusedError(f"{path} is no {what}: {instead}")
+        version = parts.get("format_version")
         if version != _FORMAT_VERSION:
             raise RefusedError(f"{path} has format version {version}, and this release reads version {_FORMAT_VERSION}")
         return cls(

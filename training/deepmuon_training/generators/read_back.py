@@ -5,9 +5,9 @@ from __future__ import annotations
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_training.export.exportable import Exportable
 from deepmuon_training.export.stored import StoredGenerator
-from deepmuon_training.generators.registry import ARCHITECTURES, architecture
+from deepmuon_training.generators.registry import architecture
 
-__all__ = ["read_back"]
+__all__ = ["read_back", "read_numbers"]
 
 
 def read_back(contents: bytes) -> Exportable:
@@ -25,16 +25,28 @@ def read_back(contents: bytes) -> Exportable:
         exporter wrote it.
     """
     stored = StoredGenerator(contents)
-    name = stored.metadata.get("architecture", "none")
-    unknown = f"a graph of architecture {name} that this release does not write"
-    if name not in ARCHITECTURES:
-        raise RefusedError(unknown)
-    try:
-        generator = architecture(name).read_back(stored)
-    except (KeyError, ValueError, StopIteration) as error:
-        raise RefusedError(unknown) from error
+    generator = _numbers(stored)
     again = generator.graph()[0]
     outputs = len(stored.graph.output)  # a node each, to give it its name
     if again.nodes != stored.graph.node[:-outputs] or again.initializers != list(stored.graph.initializer):
-        raise RefusedError(f"a graph of architecture {name} that this release would write otherwise")
+        raise RefusedError(f"a graph of architecture {generator.architecture} that this release would write otherwise")
     return generator
+
+
+def read_numbers(contents: bytes) -> Exportable:
+    """Return the same of a file whose nodes may be those of another release, if its numbers lie alike.
+
+    Raises
+    ------
+    RefusedError
+        If they do not.
+    """
+    return _numbers(StoredGenerator(contents))
+
+
+def _numbers(stored: StoredGenerator) -> Exportable:
+    name = stored.metadata.get("architecture", "none")
+    try:
+        return architecture(name).read_back(stored)
+    except (RefusedError, KeyError, ValueError, StopIteration) as error:
+        raise RefusedError(f"a graph of architecture {name} that this release does not write") from error

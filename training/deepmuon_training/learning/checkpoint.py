@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import io
-import pickle
 import time
 from pathlib import Path
 from typing import Any
@@ -15,11 +13,11 @@ from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.files.whole import write_whole
+from deepmuon_training.sealed import read_sealed, seal
 
 __all__ = ["Checkpoint", "fingerprint"]
 
 _SECONDS = 30.0
-_DAMAGES = (OSError, RuntimeError, pickle.UnpicklingError, EOFError, LookupError, TypeError, AttributeError)
 
 
 def fingerprint(*columns: NDArray[Any]) -> str:
@@ -56,9 +54,7 @@ class Checkpoint:
     def save(self, **parts: object) -> None:
         """Replace the file, if one is kept: numbers, texts, tensors, and lists and dictionaries of them."""
         if self._path is not None:
-            contents = io.BytesIO()
-            torch.save({"identity": self._identity, **parts}, contents)
-            write_whole(self._path, contents.getvalue(), overwrite=True)
+            write_whole(self._path, seal({"identity": self._identity, **parts}), overwrite=True)
             self._saved = time.monotonic()
 
     def load(self) -> dict[str, Any] | None:
@@ -67,23 +63,12 @@ class Checkpoint:
         Raises
         ------
         RefusedError
-            If the file is no checkpoint, or one of another fit.
+            If the file is no checkpoint, damaged, or one of another fit.
         """
         if self._path is None or not self._path.exists():
             return None
-        try:
-            parts: dict[str, Any] = torch.load(self._path, weights_only=True, map_location="cpu")
-            found = parts.pop("identity")
-        except (
-            OSError,
-            RuntimeError,
-            pickle.UnpicklingError,
-            EOFError,
-            LookupError,
-            TypeError,
-            AttributeError,
-        ) as error:
-            raise RefusedError(f"{self._path} is no checkpoint of this version: remove it") from error
+        parts = read_sealed(self._path, "checkpoint of this version", "remove it")
+        found = parts.pop("identity", {})
         for name, value in self._identity.items():
             if found.get(name) != value:
                 what = "other data" if name == "data" else f"the {name} {found.get(name)}, not of {value}"

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Annotated
 
 import torch
 from torch import nn
-from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
-from tqdm import tqdm
+from torch.optim.swa_utils import AveragedModel
 
 from deepmuon_runtime.errors import FailedError
 from deepmuon_training.learning.checkpoint import Checkpoint
+from deepmuon_training.progress import progress_bar
+from deepmuon_training.ranges import Range, check_ranges
 
 __all__ = ["Schedule", "fit"]
+
+_Tensors = Sequence[torch.Tensor]
 
 
 @dataclass(frozen=True)
@@ -32,19 +36,29 @@ class Schedule:
     weight_decay
         Of AdamW; 0 is Adam.
     averaging
-        Decay of the exponential moving average of the weights; the averaged weights are the result.
+        Decay of the exponential moving average of the weights, corrected for its start as Adam's are; the averaged
+        weights are the result.
     validate_every
         Steps between two looks at the validation distance.
     patience
         Stop after so many looks without a better one.
+
+    Raises
+    ------
+    RefusedError
+        If a value is out of its range.
     """
 
-    steps: int
-    learning_rate: float
-    weight_decay: float = 0.0
-    averaging: float = 0.999
-    validate_every: int = 500
-    patience: int = 20
+    steps: Annotated[int, Range(1, 100_000_000)]
+    learning_rate: Annotated[float, Range(0, 1, above=True)]
+    weight_decay: Annotated[float, Range(0, 1)] = 0.0
+    averaging: Annotated[float, Range(0, 1, below=True)] = 0.999
+    validate_every: Annotated[int, Range(1, 100_000_000)] = 500
+    patience: Annotated[int, Range(1, 1_000_000)] = 20
+
+    def __post_init__(self) -> None:
+        """Refuse what can't be."""
+        check_ranges(self)
 
     def rate_at(self, step: int) -> float:
         """Learning rate at a step, relative to the highest."""
@@ -104,14 +118,16 @@ def fit(
     weights = sum(parameter.numel() for parameter in network.parameters())
     kept = Checkpoint(checkpoint, data=data, seed=seed, schedule=asdict(schedule), **{"number of weights": weights})
     state.load(kept)
-    bar = tqdm(total=schedule.steps, initial=state.step, desc=name, disable=not progress, unit="step", mininterval=1)
+    bar = progress_bar(schedule.steps, name, " steps", hidden=not progress, initial=state.step)
     with bar:
         while state.step < schedule.steps and state.misses < schedule.patience:
             value = state.advance(loss)
             bar.update()
             if state.step % schedule.validate_every == 0 or state.step == schedule.steps:
                 state.look(distance)
-                bar.set_postfix(loss=f"{value:.4g}", distance=f"{state.last:.4g}", best=f"{state.best:.4g}")
+                bar.set_postfix(
+                    loss=f"{value:.4g}", distance=f"{state.last:.4g}", best=f"{state.best:.4g}", refresh=False
+                )
                 state.save(kept)
             elif kept.is_due:
                 state.save(kept)
@@ -119,12 +135,30 @@ def fit(
     return state.best
 
 
+def _moving_average(
+    decay: float,
+) -> Callable[[Sequence[torch.Tensor], Sequence[torch.Tensor], torch.Tensor | int], None]:
+    """Return the update of an exponential moving average that has forgotten what it began with.
+
+    A plain one gives the first weights the share decay^t of all t steps: most of it, while t is below 1 / (1 - decay).
+    Dividing by 1 - decay^t (D. P. Kingma and J. Ba, arXiv:1412.6980, section 3) takes that out.
+    """
+
+    @torch.no_grad()
+    def update(average: _Tensors, weights: _Tensors, averaged: torch.Tensor | int) -> None:
+        share = (1 - decay) / (1 - decay ** (int(averaged) + 1))
+        for mean, weight in zip(average, weights, strict=True):
+            mean.lerp_(weight, share)
+
+    return update
+
+
 class _State:
     """Everything that a resumed fit must know."""
 
     def __init__(self, network: nn.Module, schedule: Schedule, seed: int) -> None:
         self.network, self.schedule = network, schedule
-        self.average = AveragedModel(network, multi_avg_fn=get_ema_multi_avg_fn(schedule.averaging))  # type: ignore[no-untyped-call]
+        self.average = AveragedModel(network, multi_avg_fn=_moving_average(schedule.averaging))
         self.optimizer = torch.optim.AdamW(
             network.parameters(), lr=schedule.learning_rate, weight_decay=schedule.weight_decay
         )

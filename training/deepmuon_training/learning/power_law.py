@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-__all__ = ["TAIL_MUONS", "PowerLawTails", "fit_power_law"]
+__all__ = ["TAIL_MUONS", "PowerLawTails", "fit_power_law", "outermost"]
 
 TAIL_MUONS = 1000
 """Each tail is fitted to, and begins at, so many muons from the end of the training sample, if it is a large one."""
@@ -16,7 +16,14 @@ TAIL_MUONS = 1000
 LARGEST_TAIL = 1 / 60
 """No tail takes a larger share of the sample: above 50 GeV the sea-level spectrum is near a power law, at 7 GeV not."""
 
+_FARTHEST = 500.0  # times the logarithm of the range: exponents beyond say that all lies at one end
+
 Float = NDArray[np.float64]
+
+
+def outermost(number: int) -> int:
+    """Return how many muons of a sample of `number` make a tail."""
+    return min(TAIL_MUONS, int(LARGEST_TAIL * number))
 
 
 def fit_power_law(values: Float, low: float, high: float) -> float:
@@ -41,7 +48,13 @@ def fit_power_law(values: Float, low: float, high: float) -> float:
             return float(span / 2 - mean_log)
         return float(1 / exponent - span / np.expm1(exponent * span) - mean_log)
 
-    return float(brentq(excess, -50, 50))
+    if span == 0:
+        return 1.0  # whatever it is
+    farthest = float(_FARTHEST / span)
+    ends = excess(-farthest), excess(farthest)
+    if ends[0] * ends[1] >= 0:  # all at one end
+        return farthest if ends[1] > 0 else -farthest
+    return float(brentq(excess, -farthest, farthest))
 
 
 @dataclass(frozen=True)
@@ -73,7 +86,7 @@ class PowerLawTails:
     def fit(cls, kinetic_energy: Float, *, energy_min: float, energy_max: float) -> PowerLawTails:
         """Fit both tails to the lowest and highest energies [GeV] of a sample."""
         n = len(kinetic_energy)
-        count = min(TAIL_MUONS, int(LARGEST_TAIL * n))
+        count = outermost(n)
         ordered = np.partition(kinetic_energy, [count, n - count - 1])
         low, high = float(ordered[count]), float(ordered[n - count - 1])
         low_exponent = fit_power_law(1 / ordered[:count], 1 / low, 1 / energy_min)
@@ -92,5 +105,6 @@ class PowerLawTails:
 def _quantile(survival: Float, low: float, high: float, exponent: float) -> Float:
     """Where the survival function of a power law on [low, high] takes a value."""
     ratio = (high / low) ** -exponent
-    quantile: Float = low * (ratio + survival * (1 - ratio)) ** (-1 / exponent)
+    within = np.minimum(survival, 1.0)  # beyond which the power law does not hold
+    quantile: Float = low * (ratio + within * (1 - ratio)) ** (-1 / exponent)
     return quantile

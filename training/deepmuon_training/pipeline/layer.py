@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tqdm import tqdm
-
 from deepmuon_runtime import Generator, read_attributes
 from deepmuon_runtime.files.whole import write_whole
 from deepmuon_training.generators.fit import fit_generator
 from deepmuon_training.generators.fitted import FittedGenerator, export_fitted
 from deepmuon_training.pipeline.seeds import step_seed
 from deepmuon_training.pipeline.settings import PipelineSettings
+from deepmuon_training.progress import progress_bar
 from deepmuon_training.sample import read_sample
 from deepmuon_training.scores.model_evaluation import evaluate_model
 from deepmuon_training.transport.slab_file import transport_file
@@ -85,7 +84,7 @@ def draw(layer: Layer, settings: PipelineSettings, progress: bool) -> None:
         f"{settings.muons} muons drawn with seed {seed} from a {settings.architecture} generator, which was fitted to "
         f"{read_attributes(layer.sample)['count']} of these with seed {layer.seed(settings, 'fit')}"
     )
-    with tqdm(total=settings.muons, desc="draw", unit=" muons", unit_scale=True, disable=not progress) as bar:
+    with progress_bar(settings.muons, "draw", " muons", hidden=not progress) as bar:
         Generator.open(file=layer.model, device="cpu").write(
             layer.carried, settings.muons, seed, progress=bar.update, attributes=drawn.attributes
         )

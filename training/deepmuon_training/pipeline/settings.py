@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.latents.philox import LARGEST_SEED
@@ -13,11 +13,13 @@ from deepmuon_training.generators.architecture import Azimuth
 from deepmuon_training.generators.fit import FEWEST_MUONS
 from deepmuon_training.generators.registry import ARCHITECTURES, architecture
 from deepmuon_training.pipeline.settings_file import read_table, settings_from
+from deepmuon_training.ranges import Range, check_ranges
 from deepmuon_training.scores import evaluate
+from deepmuon_training.transport.material import DENSITIES, check_material
 
 __all__ = ["PipelineSettings", "read_pipeline_settings"]
 
-_LEAST = {"layers": 0, "muons": FEWEST_MUONS, "muons_per_part": 1, "scored_muons": evaluate.FEWEST_MUONS, "seed": 0}
+_MOST_MUONS = 100_000_000_000
 
 
 @dataclass(frozen=True)
@@ -57,15 +59,15 @@ class PipelineSettings:
 
     architecture: str = "quantile"
     azimuth: Azimuth = "uniform"
-    layers: int = 5
-    layer_m: float = 10.0
+    layers: Annotated[int, Range(0, 1000)] = 5
+    layer_m: Annotated[float, Range(0, 10_000, above=True)] = 10.0
     material: str = "G4_WATER"
-    density: float | None = None
-    muons: int = 4_000_000
-    muons_per_part: int = 500_000
-    scored_muons: int = 20_000_000
+    density: Annotated[float | None, DENSITIES] = None
+    muons: Annotated[int, Range(FEWEST_MUONS, _MOST_MUONS)] = 4_000_000
+    muons_per_part: Annotated[int, Range(1, _MOST_MUONS)] = 500_000
+    scored_muons: Annotated[int, Range(evaluate.FEWEST_MUONS, _MOST_MUONS)] = 20_000_000
     direct: bool = False
-    seed: int = 1
+    seed: Annotated[int, Range(0, LARGEST_SEED)] = 1
     fits: Mapping[str, Any] = field(
         default_factory=lambda: {name: architecture(name).settings() for name in ARCHITECTURES}
     )
@@ -74,13 +76,8 @@ class PipelineSettings:
         """Refuse what can't be."""
         if self.architecture not in ARCHITECTURES:
             raise RefusedError(f"architecture is {self.architecture!r}, and should be {' or '.join(ARCHITECTURES)}")
-        for key, least in _LEAST.items():
-            if getattr(self, key) < least:
-                raise RefusedError(f"{key} is {getattr(self, key)}, and should be at least {least}")
-        if self.seed > LARGEST_SEED:
-            raise RefusedError(f"seed is {self.seed}, and should be at most 2^64 - 1")
-        if self.layer_m <= 0:
-            raise RefusedError(f"layer_m is {self.layer_m:g}, and should be above 0")
+        check_ranges(self)
+        architecture(self.architecture).check_azimuth(self.azimuth)
 
     @property
     def fit(self) -> Any:
@@ -94,6 +91,11 @@ def read_pipeline_settings(path: Path) -> PipelineSettings:
     Raises
     ------
     RefusedError
-        If the file is no TOML, or a key or value is none of these settings.
+        If the file is no TOML, a key or value is none of these settings, or Geant4 knows no such material.
     """
-    return settings_from(PipelineSettings(), read_table(path), str(path))
+    settings = settings_from(PipelineSettings(), read_table(path), str(path))
+    try:
+        check_material(settings.material, settings.density)
+    except RefusedError as error:
+        raise RefusedError(f"{path}: {error}") from error
+    return settings

@@ -1,4 +1,4 @@
-"""Work in steps, each of which ends with a file: what is there is not done again."""
+"""Work in steps, each of which ends with a file: what is there, and is what was written, is not done again."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 from statistics import fmean
 
 from deepmuon_runtime.errors import FailedError, RefusedError
+from deepmuon_training.pipeline import checksums
 
 __all__ = ["Step", "run_steps"]
 
@@ -56,6 +57,7 @@ class Step:
                 self.make(saved, progress)
             except RefusedError as error:  # by then the user's input is not at fault
                 raise FailedError(f"{self.kind} {self.what}: {error}") from error
+            checksums.record(self.result)
         shutil.rmtree(saved, ignore_errors=True)
 
 
@@ -73,9 +75,14 @@ def run_steps(steps: Sequence[Step], say: Callable[[str], object], progress: boo
 
     Raises
     ------
+    RefusedError
+        If a file that is there is not what was written; before anything is done.
     FailedError
         If a step fails.
     """
+    for step in steps:
+        if step.is_done:
+            checksums.check(step.result)
     for number, step in enumerate(steps, 1):
         say(f"{number:>3}  {'done' if step.is_done else '':4}  {step.result.name:26}  {step.kind} {step.what}")
     seconds: dict[str, list[float]] = defaultdict(list)

@@ -29,6 +29,9 @@ SEED = 5
 MARGIN = 2.0**-12
 """No charge changes when the latents move by this much: an engine's rounding does not change it either."""
 
+STEADY = 2.0**-20, 1e-3
+"""Nor does a direction change by more than the second number when they move by the first: no other row is read."""
+
 
 def muon_vectors(model: Path) -> str:
     """Return the test vectors of a model that was exported here, as JSON.
@@ -72,11 +75,14 @@ def muon_vectors(model: Path) -> str:
 
 
 def _random(generator: Exportable) -> NDArray[np.float32]:
-    """Return random draws none of whose charges is near its threshold."""
+    """Return random draws of which rounding changes no charge and no row of a table."""
     draws = max(2, -(-MUONS // generator.muons_per_draw))
     latent = latents(seed=SEED, first=0, draws=4 * draws, latent_size=generator.latent_size)
     low, charge, high = (_muons(generator, latent + shift)[2] for shift in (-MARGIN, 0, MARGIN))
-    sure = ((low == charge) & (charge == high)).reshape(len(latent), -1).all(axis=1)
+    nudge, change = STEADY
+    left, here, right = (_muons(generator, latent + np.float64(shift))[1] for shift in (-nudge, 0, nudge))
+    still = np.maximum(np.abs(left - here), np.abs(right - here)).max(axis=1) < change
+    sure = ((low == charge) & (charge == high) & still).reshape(len(latent), -1).all(axis=1)
     chosen: NDArray[np.float32] = latent[sure][:draws]
     return chosen
 
@@ -85,7 +91,7 @@ def _end_points(size: int) -> NDArray[np.float32]:
     return np.array(list(itertools.product((-1, 1), repeat=size)), dtype=np.float32)
 
 
-def _muons(generator: Exportable, latent: NDArray[np.float32]) -> list[NDArray[np.float64]]:
+def _muons(generator: Exportable, latent: NDArray[np.float32] | NDArray[np.float64]) -> list[NDArray[np.float64]]:
     with torch.no_grad():
         return [column.numpy() for column in generator(torch.from_numpy(latent).double())]
 

@@ -1,7 +1,8 @@
 """Pictures of an evaluation: energy spectrum, zenith, charge, each with a ratio panel.
 
 Bands and error bars are one standard deviation of independent muons: the band of the held-out ones, the
-bars of the generated ones. Bins with fewer than 25 muons (charge: 100) are not drawn.
+bars of the generated ones. Bins with fewer than 25 muons (zenith: 1, charge: 100) are not drawn; a triangle
+stands for a ratio beyond its panel.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ def draw_zenith(evaluation: Evaluation, title: str = "") -> Figure:
 
     def spectrum(spectra: Spectra) -> _Curve:
         counts = np.array(spectra.by_cos_zenith)
-        return _density(counts, COS_ZENITH_EDGES, counts.sum())
+        return _density(counts, COS_ZENITH_EDGES, counts.sum(), fewest=1)  # to the horizon, however few
 
     labels = {"xlabel": "cos zenith", "ylabel": "(1/N) dN/d cos zenith", "yscale": "log"}
     return _draw(evaluation, spectrum, COS_ZENITH_EDGES, title, **labels)
@@ -104,9 +105,9 @@ def _enough(counts: NDArray[np.int64], fewest: int = _FEWEST) -> Float:
     return np.where(counts >= fewest, counts, np.nan)
 
 
-def _density(counts: NDArray[np.int64], edges: Float, total: int) -> _Curve:
+def _density(counts: NDArray[np.int64], edges: Float, total: int, fewest: int = _FEWEST) -> _Curve:
     """Turn counts into a density of unit integral over all muons, seen or not."""
-    drawn, scale = _enough(counts), total * np.diff(edges)
+    drawn, scale = _enough(counts, fewest), total * np.diff(edges)
     return _Curve(drawn / scale, np.sqrt(drawn) / scale)
 
 
@@ -128,6 +129,7 @@ def _draw(evaluation: Evaluation, curve: Callable[[Spectra], _Curve], edges: Flo
             ],
         )
         _draw_panel(lower, edges, ratio, _Curve(unit / unit, held_out.error / unit))
+        _mark_beyond(lower, edges, ratio.value)
         figure.align_ylabels()
     return figure
 
@@ -137,9 +139,20 @@ def _draw_panel(axes: Axes, edges: Float, generated: _Curve, held_out: _Curve) -
     low, high = held_out.value - held_out.error, held_out.value + held_out.error
     band = axes.stairs(high, edges, baseline=low, fill=True, color=_BLUE, alpha=0.25, lw=0)
     line = axes.stairs(held_out.value, edges, baseline=None, color=_BLUE, lw=1.0)
-    center = np.sqrt(edges[1:] * edges[:-1]) if axes.get_xscale() == "log" else (edges[1:] + edges[:-1]) / 2
-    points = axes.errorbar(center, *generated, fmt="o", color=_RED, ms=2.5, elinewidth=0.9)
+    points = axes.errorbar(_centres(axes, edges), *generated, fmt="o", color=_RED, ms=2.5, elinewidth=0.9)
     return [(band, line), points]
+
+
+def _mark_beyond(axes: Axes, edges: Float, value: Float) -> None:
+    """Draw a triangle at the edge of a panel for each value beyond it."""
+    low, high = axes.get_ylim()
+    for beyond, edge, marker in ((value > high, high, "^"), (value < low, low, "v")):
+        axes.plot(_centres(axes, edges)[beyond], np.full(beyond.sum(), edge), marker, color=_RED, ms=5, clip_on=False)
+
+
+def _centres(axes: Axes, edges: Float) -> Float:
+    centres: Float = np.sqrt(edges[1:] * edges[:-1]) if axes.get_xscale() == "log" else (edges[1:] + edges[:-1]) / 2
+    return centres
 
 
 def _ratio_limits(ratio: _Curve) -> tuple[float, float]:

@@ -6,15 +6,19 @@ import base64
 import io
 from collections.abc import Callable, Iterable, Sequence
 from html import escape
+from itertools import pairwise
+from math import hypot, sqrt
 
 from matplotlib.figure import Figure
 
 from deepmuon_runtime.model.metadata import Model
+from deepmuon_training.data.cry_cells import COS_ZENITH_EDGES
 from deepmuon_training.reports.pictures import draw_charge, draw_energy, draw_zenith
 from deepmuon_training.sample import Sample
 from deepmuon_training.scores.evaluation import Evaluation
 from deepmuon_training.scores.histograms import Bin
-from deepmuon_training.scores.scorecard import TABLE_HEAD, Score, scorecard, table_rows
+from deepmuon_training.scores.score import Score
+from deepmuon_training.scores.scorecard import TABLE_HEAD, scorecard, table_rows
 
 __all__ = ["html_report"]
 
@@ -23,6 +27,8 @@ _PICTURES: dict[str, Callable[[Evaluation], Figure]] = {
     "Zenith angle": draw_zenith,
     "Fraction of mu+": draw_charge,
 }
+
+_OPEN = ("missed", "too few muons to tell", "not measured")
 
 _STYLE = """
 :root { color-scheme: light dark; --ink: #1b1f24; --paper: #ffffff; --soft: #57606a; --line: #d8dee4; --band: #f4f6f8;
@@ -71,8 +77,10 @@ def html_report(evaluation: Evaluation, model: Model, held_out: Sample, held_out
         f'<p class="summary">{escape(_summary(evaluation, scores))}</p>',
         "<h2>Scores</h2>",
         "<p>Beside each number stands what two samples of one distribution and these sizes show: a score means "
-        "something only where it is beyond that. Sigma is the deviation in its noise. Targets are those of the "
-        "released models of this architecture, where there are any.</p>",
+        "something only where it is beyond that. Sigma is the deviation in its noise, excess what is beyond three "
+        "sigma. Targets are those of the released models of this architecture, where there are any; the effective "
+        "limit is the smallest deviation that these numbers of muons let one call missed.</p>",
+        *_independence_of(evaluation),
         _table(TABLE_HEAD, table_rows(scores)),
         "<h2>Pictures</h2>",
         "<p>Line and band: held-out muons with one standard deviation; points: generated ones.</p>",
@@ -81,6 +89,8 @@ def html_report(evaluation: Evaluation, model: Model, held_out: Sample, held_out
         _bins(evaluation.energy_bins, "GeV"),
         "<h2>Zenith bins</h2>",
         _bins(evaluation.zenith_bins, "degrees"),
+        "<h2>Cos zenith, to the horizon</h2>",
+        _table(("from", "to", "generated", "held out", "found / expected"), _cos_zenith(evaluation)),
         "<h2>Azimuth</h2>",
         "<p>Amplitude of each harmonic of the azimuth (0: uniform), and that of the difference of generated and "
         "held-out muons with its root mean square in alike samples.</p>",
@@ -98,13 +108,43 @@ def _summary(evaluation: Evaluation, scores: Sequence[Score]) -> str:
         f"{evaluation.generated_muons:,} generated muons (seed {evaluation.seed}) against "
         f"{evaluation.held_out_muons:,} held-out ones."
     )
-    judged = [score for score in scores if score.met is not None]
-    missed = [score.name for score in judged if not score.met]
+    judged = [score for score in scores if score.target]
     if not judged:
-        return f"{compared} There are no targets for this architecture."
-    return f"{compared} {len(judged) - len(missed)} of {len(judged)} targets are met" + (
-        f"; missed: {', '.join(missed)}." if missed else "."
-    )
+        differing = [score.name for score in scores if (score.verdict or "").startswith("differs")]
+        return f"{compared} There are no targets for this architecture; " + (
+            f"beyond noise: {', '.join(differing)}." if differing else "nothing differs beyond noise."
+        )
+    names = {verdict: [score.name for score in judged if score.verdict == verdict] for verdict in _OPEN}
+    opened = [f"{verdict}: {', '.join(found)}" for verdict, found in names.items() if found]
+    met = sum(score.met is True for score in judged)
+    return f"{compared} {'; '.join([f'{met} of {len(judged)} targets are met', *opened])}."
+
+
+def _independence_of(evaluation: Evaluation) -> list[str]:
+    """Say how correlated the held-out muons were taken to be, where that was stated."""
+    if evaluation.variance_factor == 1:
+        return []
+    return [
+        f"<p>Counts of held-out muons are taken to vary by {evaluation.variance_factor:g} times the variance of "
+        "independent ones.</p>"
+    ]
+
+
+def _cos_zenith(evaluation: Evaluation) -> list[tuple[str, ...]]:
+    p, q = evaluation.generated_spectra.by_cos_zenith, evaluation.held_out_spectra.by_cos_zenith
+    s = sum(p) / sum(q)
+    return [
+        (
+            f"{low:.2f}",
+            f"{high:.2f}",
+            f"{a:,}",
+            f"{b:,}",
+            f"{a / (s * b):.3f} ± {hypot(sqrt(a), s * sqrt(b)) / (s * b):.3f}",
+        )
+        if b
+        else (f"{low:.2f}", f"{high:.2f}", f"{a:,}", "0", "undefined")
+        for (low, high), a, b in zip(pairwise(COS_ZENITH_EDGES), p, q, strict=True)
+    ]
 
 
 def _model_facts(model: Model) -> list[tuple[str, str]]:

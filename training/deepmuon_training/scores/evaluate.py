@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import inf
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from deepmuon_training.scores.histograms import (
 from deepmuon_training.scores.independence import measure_independence
 from deepmuon_training.scores.kolmogorov_smirnov import kolmogorov_smirnov
 from deepmuon_training.scores.totals import (
+    Rate,
     compare_charge_ratio,
     compare_rate,
     count_unphysical,
@@ -42,16 +44,18 @@ def evaluate(
     seed: int,
     muons_per_draw: int = 1,
     raw_truth: Muons | None = None,
-    generated_rate: tuple[float, float] | None = None,
-    truth_rate: tuple[float, float] | None = None,
+    generated_rate: Rate | None = None,
+    truth_rate: Rate | None = None,
+    variance_factor: float = 1.0,
     energy_range: tuple[float, float] = (LOWEST_ENERGY, HIGHEST_ENERGY),
     unphysical_before_mapping: float | None = None,
 ) -> Evaluation:
     """Compare generated muons with held-out ones.
 
-    All noise is that of independent muons. Where a draw is a correlated set (`muons_per_draw` above 1), the
-    counts of generated muons fluctuate otherwise, and `independence` says by how much.
-    CRY's own muons come in showers: held-out means of log E have a fifth more variance than stated.
+    All noise is that of independent muons, unless `variance_factor` says otherwise of the held-out ones. Where a draw
+    is a correlated set (`muons_per_draw` above 1), the counts of generated muons fluctuate otherwise, and
+    `independence` says by how much. Charges, azimuths and the classifier are taken
+    as independent in any case.
     Unphysical muons are counted, and left out of every other score.
 
     Parameters
@@ -67,7 +71,10 @@ def evaluate(
     raw_truth
         Held-out muons with the histogram steps still in, compared on CRY's cells only.
     generated_rate, truth_rate
-        Rate and its standard uncertainty [Hz/m2], where known.
+        Rate and its statistical standard uncertainty [Hz/m2], where known.
+    variance_factor
+        How many times larger than of independent muons the variance of held-out counts is: above 1 where muons come in
+        showers.
     energy_range
         Lowest and highest energy [GeV] that the generator may give.
     unphysical_before_mapping
@@ -76,8 +83,11 @@ def evaluate(
     Raises
     ------
     RefusedError
-        For fewer than 100,000 physical muons of either, or fewer than 100 draws.
+        For fewer than 100,000 physical muons of either, or fewer than 100 draws, or a variance factor below 0.
     """
+    if not 0 < variance_factor < inf:
+        raise RefusedError(f"the variance factor is {variance_factor:g}, and should be above 0: 1 is independence")
+    v = variance_factor
     everything = generated if isinstance(generated, Muons) else Muons.concatenate(list(generated) or [truth[:0]])
     p = _physical(everything, energy_range, "generated")
     q = _physical(truth, energy_range, "held-out")
@@ -88,16 +98,16 @@ def evaluate(
         muons_per_draw=muons_per_draw,
         seed=seed,
         ks={
-            "energy": kolmogorov_smirnov(p.kinetic_energy, q.kinetic_energy),
-            "u": kolmogorov_smirnov(p.u, q.u),
-            "v": kolmogorov_smirnov(p.v, q.v),
-            "cos zenith": kolmogorov_smirnov(p.cos_zenith, q.cos_zenith),
+            "energy": kolmogorov_smirnov(p.kinetic_energy, q.kinetic_energy, v),
+            "u": kolmogorov_smirnov(p.u, q.u, v),
+            "v": kolmogorov_smirnov(p.v, q.v, v),
+            "cos zenith": kolmogorov_smirnov(p.cos_zenith, q.cos_zenith, v),
         },
-        cells=compare_cells(p_counts, q_counts),
-        cells_against_raw=None if raw_truth is None else compare_cells(p_counts, count_muons(raw_truth)),
-        energy_bins=compare_energy_bins(p_counts, q_counts),
-        zenith_bins=compare_zenith_bins(p, q),
-        tails=compare_tails(p, q),
+        cells=compare_cells(p_counts, q_counts, v),
+        cells_against_raw=None if raw_truth is None else compare_cells(p_counts, count_muons(raw_truth), v),
+        energy_bins=compare_energy_bins(p_counts, q_counts, v),
+        zenith_bins=compare_zenith_bins(p, q, v),
+        tails=compare_tails(p, q, v),
         charge=compare_charge(p_counts, q_counts),
         charge_ratio=compare_charge_ratio(p, q),
         azimuth=compare_azimuth(p, q),
@@ -107,6 +117,7 @@ def evaluate(
         rate=compare_rate(generated_rate, truth_rate) if generated_rate and truth_rate else None,
         generated_spectra=Spectra.of(p_counts),
         held_out_spectra=Spectra.of(q_counts),
+        variance_factor=v,
     )
 
 

@@ -59,6 +59,8 @@ class Evaluation:
         See their classes; rate is None where one is unknown.
     generated_spectra, held_out_spectra : Spectra
         What the pictures show.
+    variance_factor : float
+        How many times larger than of independent muons the variance of held-out counts was taken to be.
     """
 
     generated_muons: int
@@ -80,6 +82,7 @@ class Evaluation:
     rate: RateScore | None
     generated_spectra: Spectra
     held_out_spectra: Spectra
+    variance_factor: float = 1.0
 
     def to_json(self) -> str:
         """Write everything as JSON."""

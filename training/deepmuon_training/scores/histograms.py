@@ -1,13 +1,17 @@
 """Scores of counted muons: cells of energy and zenith, energy bins, tails, charge.
 
-Throughout, p are counts of n generated muons, q of m held-out ones, and s = n / m. The noise is that of
-independent muons; the muons of one transformer draw are not, and their counts may fluctuate less or more.
+Throughout, p are counts of n generated muons, q of m held-out ones, s = n / m, and V is how many times larger than that
+of independent muons the variance of the held-out counts is (1 unless stated). The noise is that of independent
+generated muons; those of one transformer draw are not, and their counts may fluctuate less or more.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +28,9 @@ __all__ = [
     "TailScore",
     "compare_cells",
     "compare_charge",
+    "compare_cos_zenith",
     "compare_energy_bins",
+    "compare_horizon",
     "compare_tails",
     "compare_zenith_bins",
     "count_muons",
@@ -39,6 +45,7 @@ ZENITH_EDGES = np.linspace(0, 90, 46)
 _CHUNK = 1 << 20  # muons counted at a time: bounds the memory
 _FEWEST_IN_CELL = 10  # expected muons under which a cell is left out
 _FEWEST_IN_BIN = 10_000  # muons under which a bin is left out
+_HORIZON = 4  # CRY's cells in cos zenith, from the horizon up to 0.2, of which each is a score of its own
 
 Counts = NDArray[np.int64]
 
@@ -50,9 +57,9 @@ class CellScore:
     Parameters
     ----------
     chi_square : ChiSquare
-        sum (p - s q)^2 / (s (p + q)) over cells with 10 and more expected in the smaller sample.
+        sum (p - s q)^2 / (s (p + q) (1 + s V) / (1 + s)) over cells with 10 and more expected in the smaller sample.
     delta : float
-        sqrt(max(0, chi2 - ndf) (1/n + 1/m)): the relative difference, weighted by content, beyond noise.
+        sqrt(max(0, chi2 - ndf) (1/n + V/m)): the relative difference, weighted by content, beyond noise.
     delta_noise : float
         The delta that noise of one standard deviation feigns.
     """
@@ -64,7 +71,7 @@ class CellScore:
 
 @dataclass(frozen=True)
 class Bin:
-    """One bin: edges [GeV or degrees], counts, p / (s q) - 1, its error sqrt(1/p + 1/q), and their quotient."""
+    """One bin: edges [GeV or degrees], counts, p / (s q) - 1, its error sqrt(1/p + V/q), and their quotient."""
 
     low: float
     high: float
@@ -77,7 +84,7 @@ class Bin:
 
 @dataclass(frozen=True)
 class TailScore:
-    """Muons in one tail: found p, expected s q, error sqrt(s (p + q)), and the difference in errors."""
+    """Muons in one tail: found p, expected s q, error sqrt(s (p + q) (1 + s V) / (1 + s)), difference in errors."""
 
     name: str
     found: int
@@ -109,15 +116,15 @@ def _cry_cells(counts: Counts) -> Counts:
     return np.concatenate([counts[:, :1], pairs, counts[:, -1:]], axis=1)
 
 
-def compare_cells(generated: Counts, held_out: Counts) -> CellScore:
+def compare_cells(generated: Counts, held_out: Counts, variance: float = 1.0) -> CellScore:
     """Compare two tables of `count_muons` on CRY's cells, both charges together."""
     p, q = (_cry_cells(counts).sum(axis=0).ravel() for counts in (generated, held_out))
     n, m = int(p.sum()), int(q.sum())
     s = n / m
     used = (p + q) * (min(n, m) / (n + m)) >= _FEWEST_IN_CELL
     p, q = p[used], q[used]
-    chi_square = ChiSquare.of(np.sum((p - s * q) ** 2 / (s * (p + q))), max(len(p) - 1, 0))
-    weight = 1 / n + 1 / m
+    chi_square = ChiSquare.of(np.sum((p - s * q) ** 2 / _difference_variance(p + q, s, variance)), max(len(p) - 1, 0))
+    weight = 1 / n + variance / m
     return CellScore(
         chi_square=chi_square,
         delta=sqrt(max(0.0, chi_square.chi2 - chi_square.ndf) * weight),
@@ -125,20 +132,41 @@ def compare_cells(generated: Counts, held_out: Counts) -> CellScore:
     )
 
 
-def compare_energy_bins(generated: Counts, held_out: Counts) -> tuple[Bin, ...]:
+def _difference_variance(both: Any, s: float, variance: float) -> Any:
+    """Variance of p - s q where p + q are `both` and nothing differs."""
+    return s * both * (1 + s * variance) / (1 + s)
+
+
+def compare_energy_bins(generated: Counts, held_out: Counts, variance: float = 1.0) -> tuple[Bin, ...]:
     """Compare two tables of `count_muons` in energy bins that hold 10,000 and more muons of both."""
     p, q = (counts.sum(axis=(0, 2))[1:-1] for counts in (generated, held_out))
-    return _compare_bins(ENERGY_EDGES, p, q, float(generated.sum() / held_out.sum()))
+    return _compare_bins(ENERGY_EDGES, p, q, float(generated.sum() / held_out.sum()), variance)
 
 
-def compare_zenith_bins(generated: Muons, held_out: Muons) -> tuple[Bin, ...]:
+def compare_zenith_bins(generated: Muons, held_out: Muons, variance: float = 1.0) -> tuple[Bin, ...]:
     """Compare the zenith angles in bins of two degrees that hold 10,000 and more muons of both.
 
-    These are finer than CRY's cells near the vertical, where imaging needs the muons' density.
+    These are finer than CRY's cells near the vertical, where imaging needs the muons' density. Near the horizon there
+    are none, see `compare_horizon`.
     """
     return _compare_bins(
-        ZENITH_EDGES, _count_zenith(generated), _count_zenith(held_out), len(generated) / len(held_out)
+        ZENITH_EDGES, _count_zenith(generated), _count_zenith(held_out), len(generated) / len(held_out), variance
     )
+
+
+def compare_cos_zenith(generated: Sequence[int], held_out: Sequence[int], variance: float = 1.0) -> tuple[Bin, ...]:
+    """Compare counts by CRY's cells in cos zenith [20], above the horizon's, that hold 10,000 and more of both."""
+    s = sum(generated) / sum(held_out)
+    p, q = np.array(generated), np.array(held_out)
+    return _compare_bins(COS_ZENITH_EDGES[_HORIZON:], p[_HORIZON:], q[_HORIZON:], s, variance)
+
+
+def compare_horizon(generated: Sequence[int], held_out: Sequence[int], variance: float = 1.0) -> tuple[TailScore, ...]:
+    """Compare counts by CRY's cells in cos zenith [20] in each of the four nearest to the horizon, however few."""
+    s = sum(generated) / sum(held_out)
+    edges = COS_ZENITH_EDGES[: _HORIZON + 1]
+    names = [f"cos zenith {low:.2g} to {high:.2g}" for low, high in pairwise(edges)]
+    return tuple(_compare_tail(name, p, q, s, variance) for name, p, q in zip(names, generated, held_out, strict=False))
 
 
 def _count_zenith(muons: Muons) -> Counts:
@@ -150,11 +178,13 @@ def _count_zenith(muons: Muons) -> Counts:
     return counts
 
 
-def _compare_bins(edges: NDArray[np.float64], generated: Counts, held_out: Counts, s: float) -> tuple[Bin, ...]:
+def _compare_bins(
+    edges: NDArray[np.float64], generated: Counts, held_out: Counts, s: float, variance: float
+) -> tuple[Bin, ...]:
     bins = []
     for low, high, p, q in zip(edges[:-1], edges[1:], generated.tolist(), held_out.tolist(), strict=True):
         if min(p, q) >= _FEWEST_IN_BIN:
-            deviation, error = p / (s * q) - 1, sqrt(1 / p + 1 / q)
+            deviation, error = p / (s * q) - 1, sqrt(1 / p + variance / q)
             bins.append(Bin(float(low), float(high), p, q, deviation, error, deviation / error))
     return tuple(bins)
 
@@ -170,16 +200,16 @@ def _tails(muons: Muons) -> dict[str, int]:
     }
 
 
-def compare_tails(generated: Muons, held_out: Muons) -> tuple[TailScore, ...]:
+def compare_tails(generated: Muons, held_out: Muons, variance: float = 1.0) -> tuple[TailScore, ...]:
     """Compare how many muons lie in each tail; the error is the one of both samples being alike."""
     s = len(generated) / len(held_out)
-    held_out_tails = _tails(held_out)
-    scores = []
-    for name, p in _tails(generated).items():
-        q = held_out_tails[name]
-        error = sqrt(s * (p + q))
-        scores.append(TailScore(name, p, s * q, error, (p - s * q) / error if error else 0.0))
-    return tuple(scores)
+    q = _tails(held_out)
+    return tuple(_compare_tail(name, p, q[name], s, variance) for name, p in _tails(generated).items())
+
+
+def _compare_tail(name: str, p: int, q: int, s: float, variance: float) -> TailScore:
+    error = sqrt(_difference_variance(p + q, s, variance))
+    return TailScore(name, p, s * q, error, (p - s * q) / error if error else 0.0)
 
 
 def compare_charge(generated: Counts, held_out: Counts) -> ChiSquare:

@@ -23,6 +23,7 @@ __all__ = [
     "Independence",
     "Repeats",
     "VarianceShare",
+    "count_repeated",
     "measure_independence",
 ]
 
@@ -231,7 +232,12 @@ def _count_repeats(muons: Muons) -> Repeats:
     expected = float(np.sum(balls - (boxes - empty)))
     still_empty = boxes * (boxes - 1) * np.exp(balls * np.log1p(-2 / boxes))  # pairs of empty boxes
     variance = float(np.sum(np.maximum(still_empty + empty - empty**2, 0)))
-    return Repeats(_repeated(_fingerprints(muons)), energies, expected, sqrt(variance), energies / max(expected, 1.0))
+    return Repeats(count_repeated(muons), energies, expected, sqrt(variance), energies / max(expected, 1.0))
+
+
+def count_repeated(muons: Muons) -> int:
+    """Return how many muons are equal to an earlier one in all columns, bit by bit."""
+    return _repeated(_fingerprints(muons))
 
 
 def _repeated(values: NDArray[np.unsignedinteger]) -> int:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isclose
 from pathlib import Path
 
+from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.generator import Generator
+from deepmuon_runtime.model.metadata import Model
 from deepmuon_training.sample import Sample
 from deepmuon_training.scores.evaluate import evaluate
 from deepmuon_training.scores.evaluation import Evaluation
+from deepmuon_training.scores.totals import Rate
 
 __all__ = ["evaluate_model"]
 
@@ -21,6 +25,7 @@ def evaluate_model(
     seed: int,
     raw: Sample | None = None,
     unphysical_before_mapping: float | None = None,
+    variance_factor: float | None = None,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Evaluation:
     """Draw muons from a model and compare them with held-out ones.
@@ -39,18 +44,21 @@ def evaluate_model(
         Held-out muons with the histogram steps still in, if there are any.
     unphysical_before_mapping
         As for `deepmuon_training.scores.evaluate.evaluate`.
+    variance_factor
+        As for the same; if left out what the held-out muons' file says, or 1.
     progress
         Called with the number of muons drawn since the last call.
 
     Raises
     ------
     RefusedError
-        If the model can't be opened, or there are too few muons of either.
+        If the model can't be opened, is of another depth or medium, or there are too few muons of either.
     FailedError
         If the model gives an unphysical muon.
     """
     generator = Generator.open(file=model, device="cpu")
     facts = generator.model
+    _check_place(facts, held_out)
     drawn = []
     for piece in generator.chunks(muons, seed):
         drawn.append(piece)
@@ -63,11 +71,21 @@ def evaluate_model(
         raw_truth=None if raw is None else raw.muons,
         generated_rate=_rate(facts.rate_hz_per_m2, facts.rate_uncertainty_hz_per_m2),
         truth_rate=_rate(held_out.rate, held_out.rate_uncertainty),
+        variance_factor=variance_factor or held_out.variance_factor or 1.0,
         energy_range=(facts.energy_min_gev, facts.energy_max_gev),
         unphysical_before_mapping=unphysical_before_mapping,
     )
 
 
-def _rate(rate: float | None, uncertainty: float | None) -> tuple[float, float] | None:
-    """Return a rate with its uncertainty, 0 where nobody stated one."""
-    return None if rate is None else (rate, uncertainty or 0.0)
+def _check_place(model: Model, held_out: Sample) -> None:
+    """Refuse muons of another place: two depths differ by far more than any generator from its sample."""
+    same_depth = isclose(model.depth_m, held_out.depth_m, rel_tol=1e-5, abs_tol=1e-5)
+    if not same_depth or (held_out.depth_m > 0 and model.medium != held_out.medium):
+        raise RefusedError(
+            f"{model.name} gives muons under {model.depth_m:g} m of {model.medium}, and the held-out ones are from "
+            f"under {held_out.depth_m:g} m of {held_out.medium}: compare muons of one place"
+        )
+
+
+def _rate(rate: float | None, uncertainty: float | None) -> Rate | None:
+    return None if rate is None else (rate, uncertainty)

@@ -13,6 +13,7 @@ from deepmuon_runtime.physical import Fault, find_unphysical
 
 __all__ = [
     "ChargeRatio",
+    "Rate",
     "RateScore",
     "UnphysicalMuons",
     "compare_charge_ratio",
@@ -20,6 +21,10 @@ __all__ = [
     "count_unphysical",
     "is_physical",
 ]
+
+
+Rate = tuple[float, float | None]
+"""A rate and its statistical standard uncertainty [Hz/m2], None where that is unknown."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +45,15 @@ class UnphysicalMuons:
 
 @dataclass(frozen=True)
 class RateScore:
-    """Rates [Hz/m2] with their errors, and their difference in its error (0 for two equal exact rates)."""
+    """Rates [Hz/m2] with their statistical errors, and their difference in its error.
+
+    An error is None where nobody stated one, and so is then the difference; it is 0 for two equal exact rates.
+    """
 
     generated: float
-    generated_error: float
+    generated_error: float | None
     held_out: float
-    held_out_error: float
+    held_out_error: float | None
     sigma: float | None
 
 
@@ -92,9 +100,12 @@ def _any(faults: dict[Fault, NDArray[np.bool_]], muons: int) -> NDArray[np.bool_
     return has_any
 
 
-def compare_rate(generated: tuple[float, float], held_out: tuple[float, float]) -> RateScore:
-    """Compare two rates, each with its standard uncertainty [Hz/m2]."""
-    error, difference = hypot(generated[1], held_out[1]), generated[0] - held_out[0]
+def compare_rate(generated: Rate, held_out: Rate) -> RateScore:
+    """Compare two rates, each with its statistical standard uncertainty [Hz/m2], or None where that is unknown."""
+    difference = generated[0] - held_out[0]
+    if generated[1] is None or held_out[1] is None:
+        return RateScore(*generated, *held_out, None)
+    error = hypot(generated[1], held_out[1])
     sigma = difference / error if error > 0 else (0.0 if difference == 0 else None)
     return RateScore(*generated, *held_out, sigma)
 

@@ -13,12 +13,12 @@ import geant4_pybind as g4
 
 __all__ = ["MuonPhysics", "NoSecondaries", "initialize"]
 
-_PRODUCTION_CUT = 100 * g4.mm
+_PRODUCTION_CUT = 100.0  # mm
 """Secondaries of shorter range are part of the muon's continuous loss. A cut of 1 mm gives the same mean energy
 (10 GeV muons through 10 m of water: 7.519 +- 0.001 and 7.521 +- 0.005 GeV) and scattering angle within 1 %,
 at a tenth of the speed."""
 
-_STEP_OVER_RANGE, _FINAL_RANGE = 0.02, 10 * g4.mm
+_STEP_OVER_RANGE, _FINAL_RANGE = 0.02, 10.0  # the second in mm
 """Steps are this fraction of the muon's range, until that is short. With Geant4's own 0.2 a 10 GeV muon
 crosses 10 m of water in two or three steps, and its scattering angle comes out 4 % too small."""
 
@@ -59,7 +59,7 @@ class NoSecondaries(g4.G4UserStackingAction):
 
 def initialize(manager: g4.G4RunManager) -> None:
     """Initialize a run manager, whose geometry, physics and actions are set, with steps and cuts fit for muons."""
-    g4.G4EmParameters.Instance().SetStepFunctionMuHad(_STEP_OVER_RANGE, _FINAL_RANGE)
+    g4.G4EmParameters.Instance().SetStepFunctionMuHad(_STEP_OVER_RANGE, _FINAL_RANGE * g4.mm)
     manager.Initialize()
     # A cut set in the physics list has no effect here.
-    g4.G4UImanager.GetUIpointer().ApplyCommand(f"/run/setCut {_PRODUCTION_CUT / g4.mm} mm")
+    g4.G4UImanager.GetUIpointer().ApplyCommand(f"/run/setCut {_PRODUCTION_CUT} mm")

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from deepmuon_runtime.errors import FailedError
+from deepmuon_training.progress import progress_bar
 from deepmuon_training.transport.geant4_data import without_data_sets
 
 __all__ = ["CHUNK", "EXIT", "PRIMARY", "SlabJob", "chunk_file", "run_geant4", "sideways_file"]
@@ -121,7 +122,7 @@ def run_geant4(
         folder = Path(name)
         job.write(folder)
         np.save(folder / "primaries.npy", primaries)
-        bar = tqdm(total=len(primaries), desc="Geant4", unit=" muons", unit_scale=True, disable=not progress)
+        bar = progress_bar(len(primaries), "Geant4", " muons", hidden=not progress)
         with bar, ExitStack() as running:
             shares = [range(first, chunks, processes) for first in range(processes)]
             _wait([running.enter_context(_Process(folder, share)) for share in shares], bar)

@@ -8,9 +8,10 @@ from difflib import get_close_matches
 from functools import cache
 
 from deepmuon_runtime.errors import FailedError, RefusedError
+from deepmuon_training.ranges import Range
 from deepmuon_training.transport.geant4_data import without_data_sets
 
-__all__ = ["STANDARD_ROCK", "STANDARD_ROCK_DENSITY", "check_material", "known_materials", "medium"]
+__all__ = ["DENSITIES", "STANDARD_ROCK", "STANDARD_ROCK_DENSITY", "check_material", "known_materials", "medium"]
 
 STANDARD_ROCK = "standard_rock"
 """The rock of the muon literature (Z = 11, A = 22), which Geant4 has no name for."""
@@ -18,7 +19,8 @@ STANDARD_ROCK = "standard_rock"
 STANDARD_ROCK_DENSITY = 2.65
 """Its density in g/cm3, unless another is stated."""
 
-_DENSITIES = 1e-6, 30.0  # g/cm3: from a thin gas to the densest metal
+DENSITIES = Range(1e-6, 30.0)
+"""Of matter, in g/cm3: from a thin gas to the densest metal."""
 
 
 def medium(name: str, density: float | None) -> str:
@@ -54,8 +56,8 @@ def check_material(name: str, density: float | None) -> None:
     RefusedError
         If there is no such material, or the density is not one of matter.
     """
-    if density is not None and not _DENSITIES[0] <= density <= _DENSITIES[1]:
-        raise RefusedError(f"a density of {density:g} g/cm3: it must be from {_DENSITIES[0]:g} to {_DENSITIES[1]:g}")
+    if density is not None and density not in DENSITIES:
+        raise RefusedError(f"a density of {density:g} g/cm3: it should be {DENSITIES}")
     names = known_materials()
     if name not in names:
         similar = get_close_matches(name, names) or ["G4_WATER", "G4_CONCRETE", STANDARD_ROCK]

@@ -9,15 +9,19 @@ from importlib.metadata import version
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import binomtest
 
-from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.errors import FailedError, RefusedError
 from deepmuon_runtime.muons import Muons
 from deepmuon_runtime.physical import LOWEST_ENERGY, POSITIVE_ENERGIES, first_unphysical
 from deepmuon_training.sample import Sample
 from deepmuon_training.transport.geant4_processes import PRIMARY, SlabJob, run_geant4
 from deepmuon_training.transport.material import check_material, medium
 
-__all__ = ["Transported", "below_slab", "transport"]
+__all__ = ["Transported", "below_slab", "refuse_none", "transport"]
+
+ONE_SIGMA = 0.6827
+"""Confidence of an interval of one standard deviation on each side."""
 
 _LEAST_LOSS = 0.18
 """A muon with E |w| below so many GeV per metre of water is not carried, because it can't arrive.
@@ -70,9 +74,14 @@ class Transported:
         return len(self.sample) / self.started
 
     @property
+    def surviving_fraction_interval(self) -> tuple[float, float]:
+        """Its exact interval of 68.27 % confidence, which has a width for no survivor and for all, too."""
+        return _interval(len(self.sample), self.started)
+
+    @property
     def surviving_fraction_error(self) -> float:
-        """Binomial standard error of the surviving fraction."""
-        return _binomial_error(len(self.sample), self.started)
+        """Half the width of that interval."""
+        return _error(len(self.sample), self.started)
 
 
 def transport(
@@ -168,7 +177,7 @@ def below_slab(sample: Sample, started: int, survived: int, thickness: float, ov
     how : str
         How they were carried, for the provenance.
     """
-    fraction, error = survived / started, _binomial_error(survived, started)
+    fraction, error = survived / started, _error(survived, started)
     return sample.then(
         f"carried through {thickness:g} m of {overburden} by geant4_pybind {version('geant4_pybind')}, "
         f"{how}: {survived} of {started} survived",
@@ -189,16 +198,42 @@ def _how(seed: int, box: tuple[float, float] | None) -> str:
     return f"seed {seed}" if box is None else f"{box[0]:g} m x {box[1]:g} m wide, seed {seed}"
 
 
-def _binomial_error(survived: int, started: int) -> float:
-    fraction = survived / started
-    return math.sqrt(fraction * (1 - fraction) / started)
+def refuse_none(survived: int, started: int, thickness: float, overburden: str) -> None:
+    """Raise an error if nothing survived: without a muon there is no sample, and no rate but a limit.
+
+    Parameters
+    ----------
+    survived, started, thickness, overburden
+        As for `below_slab`.
+
+    Raises
+    ------
+    FailedError
+        If nothing did.
+    """
+    if survived == 0:
+        raise FailedError(
+            f"none of {started:,} muons survived {thickness:g} m of {overburden} (at 68 % confidence it is below "
+            f"{_interval(0, started)[1]:.2g} of them): carry more, or take a thinner slab"
+        )
+
+
+def _interval(survived: int, started: int) -> tuple[float, float]:
+    """Return the interval of C. Clopper and E. Pearson, Biometrika 26 (1934) 404."""
+    low, high = binomtest(survived, started).proportion_ci(ONE_SIGMA, method="exact")
+    return float(low), float(high)
+
+
+def _error(survived: int, started: int) -> float:
+    low, high = _interval(survived, started)
+    return (high - low) / 2
 
 
 def _rate_uncertainty(sample: Sample, fraction: float, error: float) -> float | None:
-    """Return the uncertainty of rate x fraction, or None where the rate's own is unknown."""
-    if sample.rate is None or sample.rate_uncertainty is None:
+    """Return the statistical uncertainty of rate x fraction; that of the fraction where the rate's own is unknown."""
+    if sample.rate is None or (sample.rate_uncertainty is None and error == 0):
         return None
-    return math.hypot(sample.rate_uncertainty * fraction, sample.rate * error)
+    return math.hypot((sample.rate_uncertainty or 0.0) * fraction, sample.rate * error)
 
 
 def _check_arguments(sample: Sample, thickness: float, seed: int, processes: int, overburden: str) -> None:

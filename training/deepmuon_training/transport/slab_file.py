@@ -6,14 +6,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from numpy.random import SeedSequence
-from tqdm import tqdm
 
-from deepmuon_runtime.errors import FailedError
+from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.muon_file.check import check_file
 from deepmuon_runtime.muon_file.reader import read_attributes, read_muons
 from deepmuon_runtime.muon_file.writer import MuonWriter
+from deepmuon_training.progress import progress_bar
 from deepmuon_training.sample import read_sample, write_sample
 from deepmuon_training.transport.material import medium
-from deepmuon_training.transport.slab import below_slab, transport
+from deepmuon_training.transport.slab import below_slab, refuse_none, transport
 
 __all__ = ["transport_file"]
 
@@ -63,7 +64,7 @@ def transport_file(
     overburden = medium(material, density)
     started = int(read_attributes(source)["count"])
     parts = []
-    with tqdm(total=started, desc=target.stem, unit=" muons", unit_scale=True, disable=not progress) as bar:
+    with progress_bar(started, target.stem, " muons", hidden=not progress) as bar:
         for index, first in enumerate(range(0, started, muons_per_part)):
             number = min(muons_per_part, started - first)
             parts.append(folder / f"part-{index:05d}.h5")
@@ -77,12 +78,11 @@ def transport_file(
                     progress=False,
                 )
                 write_sample(parts[-1], carried.sample)
+            elif read_attributes(parts[-1])["count"] and check_file(parts[-1]).defects:
+                raise RefusedError(f"{parts[-1]} is damaged: remove it, and it is made again")
             bar.update(number)
     survived = sum(int(read_attributes(part)["count"]) for part in parts)
-    if survived == 0:
-        raise FailedError(
-            f"none of {started} muons survived {thickness:g} m of {overburden}: carry more, or take a thinner slab"
-        )
+    refuse_none(survived, started, thickness, overburden)
     how = f"seed {seed}, in parts of {muons_per_part}"
     lower = below_slab(upper, started, survived, thickness, overburden, how)
     with MuonWriter(target, lower.attributes) as writer:

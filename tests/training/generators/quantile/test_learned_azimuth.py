@@ -19,9 +19,9 @@ from deepmuon_training.generators.quantile.regression import RegressionSteps
 from deepmuon_training.generators.quantile.tables import tabulate
 from deepmuon_training.generators.transformer.network import LATENTS
 from deepmuon_training.learning.descent import Schedule
-from deepmuon_training.mountain import behind_mountain, rock, skyline
 from deepmuon_training.sample import Sample
 from deepmuon_training.scores.azimuth import compare_azimuth
+from studies.pictures.mountain import behind_mountain
 
 TRAINED, COMPARED = 300_000, 400_000
 SETTINGS = QuantileSchedules(
@@ -52,23 +52,6 @@ def generated(model):
 @pytest.fixture(scope="module")
 def held_out(truth):
     return behind_mountain(truth(COMPARED, 6))
-
-
-def test_the_mountain_takes_muons_away_from_the_north_only(held_out):
-    from_north = np.abs(np.arctan2(-held_out.u, -held_out.v))
-    low = held_out.cos_zenith < 0.7
-    north, south = np.sum(low & (from_north < 0.5)), np.sum(low & (from_north > np.pi - 0.5))
-    assert 0.01 < north / south < 0.2
-    assert skyline(np.array([0.0])) == pytest.approx(np.radians(60))
-
-
-def test_muons_cross_less_rock_the_steeper_they_are_and_none_above_the_skyline():
-    elevation = np.radians([5.0, 30.0, 59.0, 61.0, 90.0])
-    thickness = rock(np.zeros(5), -np.cos(elevation), -np.sin(elevation))  # going south: they come from the north
-    assert np.all(np.diff(thickness[:3]) < 0)
-    assert np.all(thickness[:3] > 0)
-    assert np.all(thickness[3:] == 0)
-    assert np.all(rock(np.zeros(5), np.cos(elevation), -np.sin(elevation)) < 1e-3)
 
 
 def test_a_uniform_azimuth_is_refused_behind_a_mountain(held_out, sample):

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from deepmuon_runtime.physical import HIGHEST_ENERGY
 from deepmuon_training.energy_transform import EnergyTransform
 from deepmuon_training.export.stored import StoredGenerator
 from deepmuon_training.generators.architecture import Architecture, Azimuth, Fit
@@ -18,6 +17,7 @@ from deepmuon_training.generators.quantile.tables import QuantileTables, table_e
 from deepmuon_training.learning.charge import ChargeProbability
 from deepmuon_training.learning.condition import EnergyCondition
 from deepmuon_training.learning.power_law import PowerLawTails
+from deepmuon_training.learning.support import Support
 from deepmuon_training.learning.uniform_azimuth import check_uniform_azimuth
 from deepmuon_training.records import from_json, to_json
 from deepmuon_training.sample import Sample
@@ -43,6 +43,7 @@ class _Quantile(Architecture[QuantileSchedules, QuantileGenerator]):
         *,
         seed: int,
         azimuth: Azimuth,
+        support: Support,
         checkpoint_folder: Path | None,
         progress: bool,
     ) -> Fit[QuantileGenerator]:
@@ -53,6 +54,7 @@ class _Quantile(Architecture[QuantileSchedules, QuantileGenerator]):
             seed=seed,
             schedules=settings,
             learn_azimuth=azimuth == "learned",
+            support=support,
             checkpoint_folder=checkpoint_folder,
             progress=progress,
         )
@@ -64,13 +66,16 @@ class _Quantile(Architecture[QuantileSchedules, QuantileGenerator]):
             "tails": to_json(networks.tails),
             "condition": to_json(networks.condition),
             "learned_azimuth": networks.azimuth is not None,
+            "cos_zenith_min": networks.cos_zenith_min,
             "weights": networks.state_dict(),
         }
 
     def unpack(self, parts: dict[str, Any]) -> QuantileGenerator:
         condition, tails = from_json(EnergyCondition, parts["condition"]), from_json(PowerLawTails, parts["tails"])
         azimuth = AzimuthDensity(condition) if parts["learned_azimuth"] else None
-        networks = QuantileGenerator(EnergyTransform(parts["mean"]), tails, ChargeProbability(condition), azimuth)
+        networks = QuantileGenerator(
+            EnergyTransform(parts["mean"]), tails, ChargeProbability(condition), azimuth, parts["cos_zenith_min"]
+        )
         networks.load_state_dict(parts["weights"])
         return networks
 
@@ -79,8 +84,8 @@ class _Quantile(Architecture[QuantileSchedules, QuantileGenerator]):
         return tables, (str(table_error(networks, tables, seed=seed)),)
 
     def read_back(self, stored: StoredGenerator) -> QuantileTables:
-        energy, zenith, charge = stored.tables()
-        return QuantileTables(energy.ravel(), zenith, charge, stored.energy_range, stored.energy_mean)
+        energy, zenith, charge = (stored.constants[f"{name}/table"] for name in ("energy", "zenith", "charge"))
+        return QuantileTables(energy, zenith, charge, stored.energy_range, stored.energy_mean)
 
 
 def _notes(networks: QuantileGenerator) -> tuple[str, ...]:
@@ -88,8 +93,9 @@ def _notes(networks: QuantileGenerator) -> tuple[str, ...]:
     low, high = (float(energy) for energy in networks.transform.energy(np.array([clip.low, clip.high])))
     return (
         f"Above {tails.high:.0f} GeV, where the training sample thins out, the flux above E goes as "
-        f"E^-{tails.high_exponent:.2f}, up to {HIGHEST_ENERGY:.0e} GeV; below {1000 * tails.low:.1f} MeV the flux "
-        f"under E goes as E^{tails.low_exponent:.2f}, down to 1 MeV.",
+        f"E^-{tails.high_exponent:.2f}, up to {tails.energy_max:g} GeV; below {1000 * tails.low:.1f} MeV the flux "
+        f"under E goes as E^{tails.low_exponent:.2f}, down to "
+        f"{1000 * tails.energy_min:g} MeV.",
         f"Muons above {high:.0f} GeV share one distribution of angles and charges; so do those below {1000 * low:.1f} "
         "MeV.",
         *(() if networks.azimuth is None else (_LEARNED_AZIMUTH,)),

@@ -24,7 +24,7 @@ _TAIL_REACH, _LEVEL_REACH = 10.0, 8.0
 _INSIDE = 1 - 1e-4
 
 TAIL_KNOTS = torch.linspace(-_TAIL_REACH, _TAIL_REACH, 41, dtype=torch.float64)
-"""The table's energies: t of `quantile_tables`, log tail probability with a sign."""
+"""The table's energies: logit of the energy's level."""
 
 LEVEL_KNOTS = torch.linspace(-_LEVEL_REACH, _LEVEL_REACH, 33, dtype=torch.float64)
 """Its zenith angles: logit of the zenith's level."""

@@ -10,7 +10,6 @@ import torch
 from numpy.typing import NDArray
 
 from deepmuon_runtime.muons import Muons
-from deepmuon_runtime.physical import HIGHEST_ENERGY, LOWEST_ENERGY
 from deepmuon_training.energy_transform import EnergyTransform
 from deepmuon_training.generators.quantile.azimuth_fit import AZIMUTH_SCHEDULE, fit_azimuth
 from deepmuon_training.generators.quantile.maps import QuantileGenerator
@@ -18,6 +17,7 @@ from deepmuon_training.generators.quantile.regression import RegressionSteps, re
 from deepmuon_training.learning.charge import CHARGE_SCHEDULE, fit_charge
 from deepmuon_training.learning.descent import Schedule
 from deepmuon_training.learning.power_law import PowerLawTails
+from deepmuon_training.learning.support import Support
 from deepmuon_training.learning.validation import split
 
 __all__ = ["QuantileSchedules", "fit_quantile"]
@@ -48,6 +48,7 @@ def fit_quantile(
     seed: int,
     schedules: QuantileSchedules | None = None,
     learn_azimuth: bool = False,
+    support: Support | None = None,
     checkpoint_folder: Path | None = None,
     progress: bool = True,
 ) -> QuantileGenerator:
@@ -63,6 +64,8 @@ def fit_quantile(
         Steps and rates.
     learn_azimuth
         Whether the azimuth's density is learned; else it is uniform.
+    support
+        Where muons can be; if left out, what `Support.of` finds.
     checkpoint_folder
         Existing folder for the checkpoints charge.pt, azimuth.pt and zenith.pt, see
         `deepmuon_training.learning.descent.fit`.
@@ -70,6 +73,7 @@ def fit_quantile(
         Whether to show progress bars.
     """
     schedules = schedules or QuantileSchedules()
+    support = support or Support.of(muons)
     energy = muons.kinetic_energy.astype(np.float64)
     transform = EnergyTransform.fit(muons.kinetic_energy)
     charge_file, azimuth_file, zenith_file = (
@@ -83,9 +87,9 @@ def fit_quantile(
         azimuth = fit_azimuth(
             muons, transform, seed=seed, schedule=schedules.azimuth, checkpoint=azimuth_file, progress=progress
         )
-    tails = PowerLawTails.fit(energy, energy_min=LOWEST_ENERGY, energy_max=HIGHEST_ENERGY)
+    tails = PowerLawTails.fit(energy, energy_min=support.energy_min, energy_max=support.energy_max)
     torch.manual_seed(seed)
-    generator = QuantileGenerator(transform, tails, charge, azimuth)
+    generator = QuantileGenerator(transform, tails, charge, azimuth, support.cos_zenith_min)
     y = transform.pre_tanh(energy)
     regress(generator.energy, y, tails.level)
     condition = generator.condition(torch.from_numpy(y.astype(np.float32))).numpy()

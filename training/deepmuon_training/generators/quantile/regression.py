@@ -13,18 +13,19 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from scipy.special import expit, logit
-from tqdm import tqdm
 
 from deepmuon_runtime.errors import FailedError
 from deepmuon_training.generators.quantile.pinball import pinball_loss
 from deepmuon_training.learning.checkpoint import Checkpoint, fingerprint
 from deepmuon_training.learning.monotone import ConditionalMonotoneMap, MonotoneMap
+from deepmuon_training.progress import progress_bar
+from deepmuon_training.ranges import Range, check_ranges
 
 __all__ = ["RegressionSteps", "regress", "regress_conditional"]
 
@@ -66,12 +67,21 @@ class RegressionSteps:
         How many such rounds at most.
     patience
         Stop after so many rounds in a row with a larger loss than the smallest one.
+
+    Raises
+    ------
+    RefusedError
+        If a value is out of its range.
     """
 
-    adam: int = 1500
-    round: int = 500
-    rounds: int = 12
-    patience: int = 3
+    adam: Annotated[int, Range(0, 10_000_000)] = 1500
+    round: Annotated[int, Range(1, 1_000_000)] = 500
+    rounds: Annotated[int, Range(0, 1_000_000)] = 12
+    patience: Annotated[int, Range(1, 1_000_000)] = 3
+
+    def __post_init__(self) -> None:
+        """Refuse what can't be."""
+        check_ranges(self)
 
 
 def regress_conditional(
@@ -145,9 +155,7 @@ def regress_conditional(
     else:
         network.load_state_dict(state.pop("network"))
         lbfgs.load_state_dict(state.pop("lbfgs"))
-    with tqdm(
-        total=steps.rounds, initial=state["round"], desc="zenith, L-BFGS", disable=not progress, unit="round"
-    ) as bar:
+    with progress_bar(steps.rounds, "zenith, L-BFGS", " rounds", hidden=not progress, initial=state["round"]) as bar:
         while state["round"] < steps.rounds and state["misses"] < steps.patience:
             lbfgs.step(lambda: _backward(lbfgs, loss))  # type: ignore[no-untyped-call]
             found = _validation_loss(network, *validation)
@@ -169,12 +177,14 @@ def _run_adam(
     """Run Adam, and pause for a look at the network every now and then, at least at the end."""
     adam = torch.optim.Adam(network.parameters(), lr=0.01)
     fall = torch.optim.lr_scheduler.CosineAnnealingLR(adam, steps)
-    for step in tqdm(range(steps), desc="zenith, Adam", disable=not progress, unit="step", mininterval=1):
-        _backward(adam, loss)
-        adam.step()
-        fall.step()
-        if (step + 1) * _LOOKS // steps > step * _LOOKS // steps:
-            yield
+    with progress_bar(steps, "zenith, Adam", " steps", hidden=not progress) as bar:
+        for step in range(steps):
+            _backward(adam, loss)
+            adam.step()
+            fall.step()
+            bar.update()
+            if (step + 1) * _LOOKS // steps > step * _LOOKS // steps:
+                yield
     if steps == 0:
         yield
 

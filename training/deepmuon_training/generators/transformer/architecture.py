@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from deepmuon_runtime.physical import LOWEST_ENERGY
+from deepmuon_runtime.errors import RefusedError
 from deepmuon_training.energy_transform import EnergyTransform, box_cox
 from deepmuon_training.export.stored import StoredGenerator
 from deepmuon_training.generators.architecture import Architecture, Azimuth, Fit
@@ -18,6 +18,7 @@ from deepmuon_training.generators.transformer.fit import TransformerSettings, fi
 from deepmuon_training.generators.transformer.model import ChargeTable, TransformerModel, radius_table, raw_muons
 from deepmuon_training.generators.transformer.network import Transformer
 from deepmuon_training.learning.charge import fit_charge
+from deepmuon_training.learning.support import Support
 from deepmuon_training.sample import Sample
 
 __all__ = ["ARCHITECTURE"]
@@ -30,6 +31,12 @@ class _Transformer(Architecture[TransformerSettings, TransformerModel]):
     settings = TransformerSettings
     checkpoints = ("transformer.pt", "charge.pt")
 
+    def check_azimuth(self, azimuth: Azimuth) -> None:
+        if azimuth == "learned":
+            raise RefusedError(
+                'azimuth = "learned" is a choice of quantile: a transformer always learns it, leave it out'
+            )
+
     def fit(
         self,
         sample: Sample,
@@ -37,6 +44,7 @@ class _Transformer(Architecture[TransformerSettings, TransformerModel]):
         *,
         seed: int,
         azimuth: Azimuth,
+        support: Support,
         checkpoint_folder: Path | None,
         progress: bool,
     ) -> Fit[TransformerModel]:
@@ -48,11 +56,13 @@ class _Transformer(Architecture[TransformerSettings, TransformerModel]):
         charge = fit_charge(
             muons, transform, seed=seed, schedule=settings.charge, checkpoint=charge_checkpoint, progress=progress
         )
-        energy_range = LOWEST_ENERGY, float(muons.kinetic_energy.max())
+        energy_range = support.energy_min, float(muons.kinetic_energy.max())
         model = TransformerModel.stored(
             network,
             transform=transform,
-            angle=radius_table(network, muons, seed=seed, generated=settings.calibration),
+            angle=radius_table(
+                network, muons, seed=seed, generated=settings.calibration, cos_zenith_min=support.cos_zenith_min
+            ),
             charge=ChargeTable.of(charge, transform),
             energy_range=energy_range,
         )

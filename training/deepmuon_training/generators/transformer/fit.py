@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import torch
@@ -22,6 +23,7 @@ from deepmuon_training.learning.charge import CHARGE_SCHEDULE
 from deepmuon_training.learning.checkpoint import fingerprint
 from deepmuon_training.learning.descent import Schedule, fit
 from deepmuon_training.learning.validation import training_rows
+from deepmuon_training.ranges import Range, check_ranges
 
 __all__ = ["TransformerSettings", "features", "fit_transformer"]
 
@@ -51,21 +53,22 @@ class TransformerSettings:
     Raises
     ------
     RefusedError
-        If d is not a multiple of 8, the network's heads, or the batch has not d muons.
+        If a value is out of its range, d is not a multiple of 8, the network's heads, or the batch has not d muons.
     """
 
-    d: int = 128
-    batch: int = 32768
-    directions: int = 32
+    d: Annotated[int, Range(HEADS, 16_384)] = 128
+    batch: Annotated[int, Range(HEADS, 100_000_000)] = 32768
+    directions: Annotated[int, Range(1, 100_000)] = 32
     schedule: Schedule = Schedule(
         steps=6000, learning_rate=1e-3, weight_decay=0.01, averaging=0.998, validate_every=250, patience=16
     )
     charge: Schedule = CHARGE_SCHEDULE
-    calibration: int = 4_000_000
+    calibration: Annotated[int, Range(1000, 1_000_000_000)] = 4_000_000
 
     def __post_init__(self) -> None:
         """Refuse a network that can't be."""
-        if self.d < 1 or self.d % HEADS:
+        check_ranges(self)
+        if self.d % HEADS:
             raise RefusedError(f"d is {self.d}, and should be a multiple of {HEADS}: the network has so many heads")
         if self.batch < self.d:
             raise RefusedError(f"a batch of {self.batch} muons is less than one draw of {self.d}")

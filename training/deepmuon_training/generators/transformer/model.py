@@ -45,6 +45,7 @@ __all__ = ["ChargeTable", "TransformerModel", "radius_table", "raw_muons"]
 
 _RADIUS_REACH = 1.4375  # above sqrt(2), the largest radius of two cosines
 _RADIUS_KNOTS = 1472  # 1024 to a unit of radius
+_ROUNDING = 2.0**-21  # relative, of cos zenith in the graph
 _GRAZING = 1e-4  # rad under the horizon: no muon is generated nearer to it
 
 _CHARGE_ROWS, _CHARGE_COLUMNS = 129, 17
@@ -63,7 +64,9 @@ def raw_muons(network: Transformer, count: int, *, seed: int) -> torch.Tensor:
     return torch.cat(parts)
 
 
-def radius_table(network: Transformer, muons: Muons, *, seed: int, generated: int = 4_000_000) -> Float32:
+def radius_table(
+    network: Transformer, muons: Muons, *, seed: int, generated: int = 4_000_000, cos_zenith_min: float = 0.0
+) -> Float32:
     """Tabulate the zenith angle [rad] of the radius sqrt(cos2 x + cos2 y) of generated muons.
 
     The angle is the one of equal rank in the sample, so that generated muons have the sample's zenith
@@ -79,6 +82,8 @@ def radius_table(network: Transformer, muons: Muons, *, seed: int, generated: in
         Of the latents.
     generated
         How many muons the network makes for it, about.
+    cos_zenith_min
+        No muon is flatter.
 
     Returns
     -------
@@ -91,9 +96,10 @@ def radius_table(network: Transformer, muons: Muons, *, seed: int, generated: in
     rank = np.searchsorted(radii, knots) / len(radii)
     angle = np.interp(rank, (np.arange(len(angles)) + 0.5) / len(angles), angles)
     beyond = knots > radii[-1]
-    angle[beyond] = np.interp(knots[beyond], [radii[-1], _RADIUS_REACH], [angles[-1], np.pi / 2 - _GRAZING])
+    flattest = min(np.arccos(min(cos_zenith_min * (1 + _ROUNDING), 1.0)), np.pi / 2 - _GRAZING)
+    angle[beyond] = np.interp(knots[beyond], [radii[-1], _RADIUS_REACH], [angles[-1], flattest])
     angle[0] = 0.0
-    table: Float32 = np.minimum(angle, np.pi / 2 - _GRAZING).astype(np.float32)
+    table: Float32 = np.minimum(angle, flattest).astype(np.float32)
     return table
 
 

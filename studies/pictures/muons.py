@@ -1,0 +1,79 @@
+"""Draws docs/images/muons.png, of freshly generated muons: ``python -m studies.pictures.muons``."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from deepmuon_runtime import Generator, Muons
+from studies.shared.processes import REPOSITORY
+
+PICTURE = REPOSITORY / "docs" / "images" / "muons.png"
+MUONS = 10_000_000
+SEED = 1
+COLOURS = {0: "#d1495b", 10: "#e08d3c", 20: "#8a9a3b", 30: "#2e8b7d", 40: "#00638a", 50: "#3b3a78"}  # by depth [m]
+ENERGY_EDGES = np.geomspace(2e-3, 2e3, 121)
+ZENITH_EDGES = np.linspace(0, 90, 91)
+
+STYLE = {
+    "font.size": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#444444",
+    "axes.grid": True,
+    "grid.color": "#e6e6e6",
+    "axes.axisbelow": True,
+    "figure.facecolor": "white",
+}
+
+Float = NDArray[np.float64]
+
+
+def main() -> None:
+    """Draw energies and zenith angles of the released models."""
+    with plt.rc_context(STYLE):
+        figure, (energy, zenith) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+        for depth in COLOURS:
+            generator = Generator.open(depth)
+            muons = generator.sample(MUONS, seed=SEED)
+            rate = generator.model.rate_hz_per_m2 or 1.0
+            draw(energy, depth, ENERGY_EDGES, energy_spectrum(muons, rate))
+            draw(zenith, depth, ZENITH_EDGES, zenith_distribution(muons, rate))
+        energy.set(xscale="log", yscale="log", ylim=(3e-4, 60))
+        energy.set(xlabel="kinetic energy / GeV", ylabel=r"$E\,\mathrm{d}\Phi/\mathrm{d}E$  /  m$^{-2}$ s$^{-1}$")
+        zenith.set(xlim=(0, 90), xticks=range(0, 91, 15), ylim=(0, None))
+        zenith.set(
+            xlabel="zenith angle / °", ylabel=r"$\mathrm{d}\Phi/\mathrm{d}\theta$  /  m$^{-2}$ s$^{-1}$ per degree"
+        )
+        zenith.legend(frameon=False, fontsize="small", handlelength=1.2)
+        figure.savefig(PICTURE, dpi=130)
+
+
+def energy_spectrum(muons: Muons, rate: float) -> Float:
+    """Flux through a horizontal plane per unit of log energy [1/(m2 s)]."""
+    counts = np.histogram(muons.kinetic_energy, ENERGY_EDGES)[0]
+    return counts * (rate / len(muons)) / np.diff(np.log(ENERGY_EDGES))
+
+
+def zenith_distribution(muons: Muons, rate: float) -> Float:
+    """Flux through a horizontal plane per degree of zenith angle [1/(m2 s)]."""
+    zenith = np.degrees(np.arctan2(np.hypot(muons.u, muons.v), muons.cos_zenith))
+    return np.histogram(zenith, ZENITH_EDGES)[0] * (rate / len(muons)) / np.diff(ZENITH_EDGES)
+
+
+def draw(axes: Axes, depth: int, edges: Float, values: Float) -> None:
+    """Draw one distribution as a filled step line."""
+    axes.stairs(
+        values,
+        edges,
+        baseline=None,
+        color=COLOURS[depth],
+        linewidth=1.6,
+        label=f"{depth} m of water" if depth else "sea level",
+    )
+
+
+if __name__ == "__main__":
+    main()
