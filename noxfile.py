@@ -161,7 +161,7 @@ def readme(session: nox.Session) -> None:
 
 @nox.session(python=PYTHON)
 def onnxruntimes(session: nox.Session) -> None:
-    """Run the released models in every ONNX Runtime that the contract and the package allow: ``nox -s onnxruntimes``."""
+    """Run the released models in every ONNX Runtime that contract and package allow: ``nox -s onnxruntimes``."""
     session.run("python", "tests/models/open_in_each_onnxruntime.py", f"{session.create_tmp()}/one")
 
 

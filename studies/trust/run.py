@@ -1,6 +1,6 @@
 """Try faults, damaged files and repetitions at random, for as long as you like: docs/trust.md, repeated.
 
-    python studies/trust/run.py --hours 1 --seed 1
+    python -m studies.trust.run --hours 1 --seed 1
 
 The campaigns take turns; each try has random numbers of its own, which follow from the seed and the try's number. What
 does not end as docs/trust.md and docs/exit_codes.md say is printed, with its number, and `--only NUMBER` tries that one

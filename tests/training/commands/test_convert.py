@@ -14,7 +14,7 @@ from deepmuon_runtime import read_attributes, read_muons
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muon_file.check import check_file
 from deepmuon_training.commands.train import train
-from deepmuon_training.data.ecomug import sea_level_muons
+from deepmuon_training.fluxes.ecomug import sea_level_muons
 
 COMMAND = Path(sysconfig.get_path("scripts")) / "deepmuon-train"
 ROWS = np.array([[2150.0, 0.6, 0.0, -0.8, -1], [830.0, 0.0, -0.28, -0.96, 1], [0.5, 0.0, 0.0, -1.0, 1]])

@@ -14,7 +14,7 @@ from support.mcpl_file import mcpl_file
 
 from deepmuon_runtime import Muons, read_attributes, read_muons, write_muons
 from deepmuon_runtime.muon_file.check import check_file
-from deepmuon_training.data.ecomug import sea_level_muons
+from deepmuon_training.fluxes.ecomug import sea_level_muons
 
 SCRIPTS = Path(sysconfig.get_path("scripts"))
 MASS = 0.1056583755
