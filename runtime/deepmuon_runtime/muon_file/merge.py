@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.files.output import check_output
 from deepmuon_runtime.latents.shard import WHOLE_RUN
 from deepmuon_runtime.muon_file.attributes import LIVE_TIMES
 from deepmuon_runtime.muon_file.format import COLUMNS, bytes_per_muon
@@ -82,7 +81,7 @@ def merge_shards(
     parts.sort(key=lambda part: (part.first, part.end))
     for part in parts[1:]:
         _check_same_run(parts[0], part)
-    check_output(output, overwrite, [part.path for part in parts])  # a virtual file would look for muons in itself
+    check_muon_output(output, overwrite, [part.path for part in parts])  # a virtual file would look for muons in itself
     total = parts[0].attributes["total"]
     _check_complete(parts, total)
     described = {name: value for name, value in parts[0].attributes.items() if name not in LIVE_TIMES}

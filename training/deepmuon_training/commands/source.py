@@ -52,13 +52,13 @@ def command(
     TABLE.csv  your own: kinetic energy in GeV, cos zenith, flux of mu+ and of mu- in 1/(m2 s sr GeV)
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime import new_seed
-    from deepmuon_runtime.files.output import check_output
+    from deepmuon_runtime.muon_file.output import check_muon_output
     from deepmuon_training.fluxes.by_name import find_flux
     from deepmuon_training.fluxes.sea_level import write_sea_level
 
     seed = new_seed() if seed is None else seed
     found = find_flux(flux, charge_ratio)
-    check_output(output, overwrite, [flux])
+    check_muon_output(output, overwrite, [flux])
     sample = write_sea_level(output, found, number, seed=seed, overwrite=overwrite)
     if not quiet:
         assert sample.rate is not None
