@@ -20,6 +20,7 @@ MODEL = Model(
     energy_max_gev=1e5,
     created_by="a test",
     licence="BSD-3-Clause",
+    flux="cry",
     rate_hz_per_m2=50.0,
     rate_uncertainty_hz_per_m2=0.1,
     metadata={},
