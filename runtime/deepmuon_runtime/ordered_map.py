@@ -8,6 +8,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import chain
 from typing import TypeVar
 
+from deepmuon_runtime.memory_limit import affordable
+
 __all__ = ["ordered_map"]
 
 LARGEST_LEAD = 8  # results: a caller who is as fast as the threads needs no more, however many they are
@@ -28,10 +30,12 @@ def ordered_map(
     items
         Taken one by one as they are needed.
     threads
-        How many run side by side; fewer where the system refuses to start so many, and none but the caller's at worst.
+        How many run side by side; fewer where the system refuses to start so many, or the memory is limited, and none
+        but the caller's at worst.
         As many results again may wait for the caller, and 8 at most.
     """
     rest = iter(items)
+    threads = affordable(threads)
     while threads:
         refused: list[Item] = []
         yield from _mapped(function, rest, threads, refused)

@@ -37,7 +37,7 @@ class Inputs:
 
     def commands(self) -> list[tuple[str, list[object]]]:
         """Return the words of each command; each writes `output` but check."""
-        make = ["--model", self.model, "-n", MUONS, "--seed", 1, "--threads", 2, "-q", "-o", "output.h5"]
+        make = ["--model", self.model, "-n", MUONS, "--seed", 1, "--threads", 16, "-q", "-o", "output.h5"]
         return [
             ("gen", make),
             ("check", [self.muons]),

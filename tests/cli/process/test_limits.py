@@ -93,13 +93,26 @@ def test_a_limit_of_the_memory_ends_a_command_in_one_line(tmp_path, muon_file, n
         )
 
 
+def test_many_threads_in_little_memory_are_fewer(tmp_path):
+    """5 sizes: a thread that lacks memory when it starts would end the process, and leave its temporary file."""
+    words = ["--depth", "10", "-n", "3000000", "--seed", "1", "--threads", "64", "-q", "-o", "output.h5"]
+    for megabytes in (310, 410, *np.random.default_rng(1).integers(260, 700, 3 * TIMES).tolist()):
+        limit = megabytes * MEGABYTE
+        assert_done_or_one_line(
+            tmp_path,
+            "gen",
+            words,
+            preexec_fn=lambda limit=limit: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)),
+        )
+
+
 @pytest.mark.skipif(os.geteuid() != 0 or shutil.which("setpriv") is None, reason="needs root, and setpriv")
 def test_where_threads_and_processes_are_refused_a_command_takes_fewer_or_says_so(anybodys_folder, muon_file):
-    """1 to 8 of them in all, for each command."""
+    """1 to 8 of them in all for `deepmuon-gen`, 1 to 4 for the others."""
     nobody = "setpriv --reuid 54321 --clear-groups --inh-caps=-all,+dac_override --ambient-caps=-all,+dac_override"
     codes: dict[str, list[int]] = {}
     for command, words in commands(shutil.copy(muon_file, anybodys_folder / "muons.h5")):
-        for most in range(1, 9):
+        for most in range(1, 9 if command == "gen" else 5):
             prefix = (*nobody.split(), "prlimit", f"--nproc={most}")
             code = assert_done_or_one_line(anybodys_folder, command, words, prefix)
             codes.setdefault(command, []).append(code)
