@@ -385,6 +385,6 @@ def test_a_slab_that_too_few_muons_cross_ends_the_run(folder: Path, tmp_path: Pa
     settings = replace(read_pipeline_settings(folder / "tiny.toml"), layer_m=60.0, direct=True)
     pipeline = plan(settings, folder / "sea.h5", tmp_path / "run")
     (tmp_path / "run").mkdir()
-    pipeline.layer[2].run(progress=False)
+    pipeline.steps[2].run(progress=False)
     with pytest.raises(FailedError, match=r"fit what came through at 60 m: \d+ muons are too few to learn from"):
-        pipeline.layer[3].run(progress=False)
+        pipeline.steps[3].run(progress=False)
