@@ -10,10 +10,15 @@ try:
 except ImportError:  # Windows
     resource = None  # type: ignore[assignment]
 
-__all__ = ["affordable"]
+__all__ = ["affordable", "is_limited"]
 
 PER_THREAD = 90_000_000  # bytes of addresses: a stack, and 64 MiB that the C library sets aside for what it allocates
 FOR_ALL = 60_000_000  # the threads that write, HDF5, the muons on their way
+
+
+def is_limited() -> bool:
+    """Tell whether the process may use less memory than there is, so that little can be too much."""
+    return resource is not None and resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
 
 
 def affordable(threads: int) -> int:
@@ -26,12 +31,9 @@ def affordable(threads: int) -> int:
     MemoryError
         If there is none left for a single one.
     """
-    if resource is None:
+    if not is_limited():
         return threads
-    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if limit == resource.RLIM_INFINITY:
-        return threads
-    left = limit - _in_use() - FOR_ALL
+    left = resource.getrlimit(resource.RLIMIT_AS)[0] - _in_use() - FOR_ALL
     if left < 0:
         raise MemoryError
     return max(1, min(threads, left // PER_THREAD))

@@ -16,8 +16,8 @@ from typing import NoReturn
 import click
 
 from deepmuon_cli.process.ending import FAILED, REFUSED, complain, run
-from deepmuon_cli.process.lack import THREADS, lack
-from deepmuon_cli.process.limits import allow_computing, forbid_memory_image
+from deepmuon_cli.process.lack import MEMORY, THREADS, lack
+from deepmuon_cli.process.limits import allow_computing, forbid_memory_image, is_memory_limited
 from deepmuon_cli.process.parent import Parent
 from deepmuon_cli.process.signals import answer, hold_back, ignore, let_through, those_of
 
@@ -90,6 +90,9 @@ def _wait(child: int, name: str) -> int:
     code = os.waitstatus_to_exitcode(status)
     if code >= 0:
         return code
+    if -code in OF_DAMAGE and -code != signal.SIGPROF and is_memory_limited():
+        complain(name, f"was ended by {signal.Signals(-code).name}: {MEMORY}, or a file is damaged")
+        return FAILED
     if -code in OF_DAMAGE:
         ending = "took no end" if -code == signal.SIGPROF else f"was ended by {signal.Signals(-code).name}"
         complain(name, f"a file is damaged so that reading it {ending}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 from collections.abc import Iterator
 
-__all__ = ["THREADS", "lack"]
+__all__ = ["MEMORY", "THREADS", "lack"]
 
 MEMORY = "memory ran out: see the limit of the shell (ulimit -v) or the batch system"
 THREADS = "the system starts no more threads or processes: see the limit of the shell (ulimit -u) or the batch system"

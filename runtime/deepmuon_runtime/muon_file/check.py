@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 
 from deepmuon_runtime.errors import reason
+from deepmuon_runtime.memory_limit import is_limited
 from deepmuon_runtime.model.metadata import Model
 from deepmuon_runtime.model.released import list_models
 from deepmuon_runtime.muon_file.attributes import attribute_defects, checksum_defects, is_generated, sound_attributes
@@ -136,8 +137,22 @@ def _read_attributes(node: h5py.HLObject, name: str, defects: list[str]) -> dict
     try:
         return stated(node)
     except READ_ERRORS as error:
-        defects.append(f"the attributes of {name} can't be read: {reason(error)}")
+        defects.append(f"the attributes of {name} can't be read: {_reason(error)}")
         return {}
+
+
+def _reason(error: Exception) -> str:
+    """Return why something can't be read.
+
+    Raises
+    ------
+    MemoryError
+        If it is for want of memory, and that is limited: no defect of the file.
+    """
+    why = reason(error)
+    if is_limited() and (isinstance(error, MemoryError) or "alloc" in why):
+        raise MemoryError(why) from error
+    return why
 
 
 def _released_model(sha256: object) -> Model | None:
@@ -155,7 +170,7 @@ def _sound_columns(
             if not found:
                 stored = VirtualColumn(column, name, progress) if column.is_virtual else column
         except READ_ERRORS as error:
-            found = [f"can't be read: {reason(error)}"]
+            found = [f"can't be read: {_reason(error)}"]
         attributes = _read_attributes(column, name, defects)
         if not found:
             sound[name] = _Column(stored, attributes.get(CHECKSUM))
@@ -217,7 +232,7 @@ def _examine_muons(columns: dict[str, _Column], report: Report, progress: Callab
         try:
             values = {name: column.read(span) for name, column in columns.items()}
         except READ_ERRORS as error:
-            report.defects.append(f"the muons from {first} on can't be read: {reason(error)}")
+            report.defects.append(f"the muons from {first} on can't be read: {_reason(error)}")
             break
         muons = Muons(**{name: values[name] for name in COLUMNS})
         report.add(muons)
