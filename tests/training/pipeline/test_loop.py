@@ -359,7 +359,7 @@ def test_a_sample_that_cannot_be_learned_or_carried_on_is_refused_before_anythin
     upward = replace(sea.muons, w=np.where(np.arange(len(sea)) == 5, 0.5, sea.muons.w).astype(np.float32))
     for name, sample, complaint in (
         ("few", replace(sea, muons=sea.muons[:100]), "100 muons are too few"),
-        ("upward", replace(sea, muons=upward), "muon number 5 does not go down"),
+        ("upward", replace(sea, muons=upward), "muon number 5 has a direction whose length is not 1"),
         ("rock", replace(sea, depth_m=5.0, medium="G4_CONCRETE"), "muons under 5 m of G4_CONCRETE can't go on in"),
     ):
         write_sample(tmp_path / f"{name}.h5", sample)
