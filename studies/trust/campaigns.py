@@ -51,7 +51,7 @@ def limit(kind: int, low: float, high: float, inputs: Inputs, random: Random, fo
     code, err = ended(process)
     see(code in (0, 1), f"{command} with {most} bytes: exit code {code}, {err!r}")
     see_line(code, err)
-    see_outputs(folder)
+    see_outputs(folder, "was ended by SIG" in err)  # a library that crashes for want of memory leaves what SIGKILL does
 
 
 def model(inputs: Inputs, random: Random, folder: Path) -> None:
