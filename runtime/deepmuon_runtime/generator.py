@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import collections.abc
-import hashlib
 import os
 import shlex
 import shutil
@@ -45,7 +44,6 @@ LARGEST_NUMBER = 2**53
 # Muons of one run of the network, about: what it works on stays in a CPU's cache; a GPU wants much at once.
 BLOCK = {"cpu": 1 << 14, "cuda": 1 << 18}
 PIECE = {"cpu": 1 << 17, "cuda": 1 << 18}  # muons of one task of a thread, and of one write, in whole blocks
-LARGEST_MODEL = 2**31 - 1  # bytes: the limit of protobuf, and so of an ONNX file without external data
 
 Outputs = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int8]]  # energy, direction, charge
 
@@ -99,11 +97,12 @@ class Generator:
         Parameters
         ----------
         depth
-            Metres of water above the muons.
+            Metres of water above the muons. Of a family, any number in its range; that of a file has its medium, and
+            the depth that stands in it if left out.
         architecture
             "quantile" or "transformer"; the default one if left out.
         file
-            An ONNX file, instead of `depth` and `architecture`.
+            An ONNX file, instead of a released model.
         device
             "cpu"; "cuda"; or "auto", which is CUDA where it can be had, else the CPU.
         threads
@@ -112,29 +111,24 @@ class Generator:
         Raises
         ------
         RefusedError
-            If there is no such model, it breaks the contract, or the device can't be had.
+            If there is no such model or depth, it breaks the contract, or the device can't be had.
         """
-        from deepmuon_runtime.model.contract import check_signature, contract_metadata
-        from deepmuon_runtime.model.device import open_session
-        from deepmuon_runtime.model.onnx_file import check_onnx_file
+        from deepmuon_runtime.model.opening import open_model, read_file
 
         threads = _usable_processors() if threads is None else threads
         if not isinstance(threads, Integral) or threads < 1:
             raise RefusedError(f"{threads!r} threads can't make muons: 1 or more can")
-        if file is None:
+        if file is not None:
+            if architecture is not None:
+                raise RefusedError("a model's file decides its architecture: give the file, and of a family a depth")
+            name, contents = str(file), read_file(Path(file))
+        else:
             if depth is None:
                 raise RefusedError("which model? Give the depth of a released one, or the file of another")
             released = released_model(depth, architecture)
-            name, content = released.name, read_released(released)
-        else:
-            if depth is not None or architecture is not None:
-                raise RefusedError("a model's file decides its depth and architecture: give the file alone")
-            name, content = str(file), _read_model(Path(file))
-        check_onnx_file(content, name)
-        session, device = open_session(content, name, device)
-        sha256 = hashlib.sha256(content).hexdigest()
-        model = Model.from_metadata(contract_metadata(session, name), name, sha256, len(content))
-        check_signature(session, model)
+            name, contents = released.name, read_released(released)
+            depth = depth if released.is_family else None
+        session, model, device = open_model(contents, name, device, depth)
         generator = cls(session, model, device, threads)
         generator._try()
         return generator
@@ -362,18 +356,6 @@ class Generator:
             check_physical(muons, self.model.energy_min_gev, self.model.energy_max_gev)
         except FailedError as error:
             raise RefusedError(f"{self.model.name} breaks the contract in a trial: {error}") from error
-
-
-def _read_model(path: Path) -> bytes:
-    if path.is_dir() or (path.exists() and not path.is_file()):
-        raise RefusedError(f"{path} is no ONNX file")
-    try:
-        if path.stat().st_size > LARGEST_MODEL:
-            raise RefusedError(f"{path} is no ONNX file: it is larger than 2 GB")
-        return path.read_bytes()
-    except (OSError, ValueError) as error:
-        reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else str(error)
-        raise RefusedError(f"the model {path} can't be read: {reason}") from error
 
 
 def _block_draws(model: Model, device: str) -> int:
