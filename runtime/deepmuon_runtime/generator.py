@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import collections.abc
 import os
-import shlex
-import shutil
-import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
@@ -19,17 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import FailedError, RefusedError, first_line
-from deepmuon_runtime.files.output import check_output
 from deepmuon_runtime.latents.philox import checked_seed, fill_latents, new_seed
 from deepmuon_runtime.latents.poisson import poisson
 from deepmuon_runtime.latents.shard import WHOLE_RUN, Shard
 from deepmuon_runtime.model.metadata import LATENTS_PER_MUON, Model
 from deepmuon_runtime.model.released import read_released, released_model
 from deepmuon_runtime.muon_file.format import BYTES_PER_MUON
+from deepmuon_runtime.muon_file.output import check_muon_output
 from deepmuon_runtime.muon_file.writer import MuonWriter
 from deepmuon_runtime.muons import MU_PLUS, Muons
 from deepmuon_runtime.ordered_map import ordered_map
 from deepmuon_runtime.physical import check_physical
+from deepmuon_runtime.room import check_disk, check_memory
 
 if TYPE_CHECKING:
     import onnxruntime
@@ -44,6 +42,7 @@ LARGEST_NUMBER = 2**53
 # Muons of one run of the network, about: what it works on stays in a CPU's cache; a GPU wants much at once.
 BLOCK = {"cpu": 1 << 14, "cuda": 1 << 18}
 PIECE = {"cpu": 1 << 17, "cuda": 1 << 18}  # muons of one task of a thread, and of one write, in whole blocks
+TRIED = 5  # values of the latents, before the first muons: the ends, the middle, and two between
 
 Outputs = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int8]]  # energy, direction, charge
 
@@ -113,7 +112,7 @@ class Generator:
         RefusedError
             If there is no such model or depth, it breaks the contract, or the device can't be had.
         """
-        from deepmuon_runtime.model.opening import open_model, read_file
+        from deepmuon_runtime.model.opening import checked_model, load_model, read_file
 
         threads = _usable_processors() if threads is None else threads
         if not isinstance(threads, Integral) or threads < 1:
@@ -128,9 +127,12 @@ class Generator:
             released = released_model(depth, architecture)
             name, contents = released.name, read_released(released)
             depth = depth if released.is_family else None
-        session, model, device = open_model(contents, name, device, depth)
+        contents, model = checked_model(contents, name, depth)
+        if file is not None:
+            cls._try_memory(contents, model)
+        session, model, device = load_model(contents, model, device)
         generator = cls(session, model, device, threads)
-        generator._try()
+        generator._try(TRIED)
         return generator
 
     def sample(self, n: int, seed: int | None = None, *, first: int = 0) -> Muons:
@@ -157,10 +159,12 @@ class Generator:
             If the model gives an unphysical muon.
         """
         numbers, seed = checked_numbers(n, first), _seed(seed)
+        instead = "take them in chunks, or write a file"
+        check_memory(len(numbers) * BYTES_PER_MUON, f"{n} muons", instead)
         try:
             muons = Muons.empty(len(numbers))
         except (MemoryError, ValueError) as error:
-            raise RefusedError(f"{n} muons do not fit in memory: take them in chunks, or write a file") from error
+            raise RefusedError(f"{n} muons do not fit in memory: {instead}") from error
 
         def fill(part: range) -> None:
             self._fill(muons[part.start - numbers.start : part.stop - numbers.start], seed, part.start)
@@ -233,7 +237,8 @@ class Generator:
         """
         total, seed = len(checked_numbers(n)), _seed(seed)
         numbers = shard.numbers(total)
-        _check_space(check_output(path, overwrite).parent, len(numbers))
+        folder = check_muon_output(path, overwrite).parent
+        check_disk(folder, len(numbers) * BYTES_PER_MUON, f"{len(numbers):,} muons")
         described = {**self._attributes(seed, shard, total), **(attributes or {})}
         chunks = self.chunks(len(numbers), seed, first=numbers.start)
         with MuonWriter(path, described, overwrite) as writer, closing(chunks):
@@ -287,7 +292,6 @@ class Generator:
             "model_sha256": model.sha256,
             "architecture": model.architecture,
             "device": self.device,
-            "command_line": _command_line(),
             **{name: rate for name, rate in rates.items() if rate is not None},
         }
 
@@ -327,7 +331,9 @@ class Generator:
         try:
             energy, direction, charge = run()
         except Exception as error:  # ONNX Runtime's own classes have no common base
-            reason = first_line(error)
+            from deepmuon_runtime.model.trial import memory_asked
+
+            reason = memory_asked(error) or first_line(error)
             raise FailedError(f"the model {self.model.name} failed: {reason}") from error
         kept = slice(skipped, skipped + len(muons))
         muons.kinetic_energy[:] = energy[kept]
@@ -335,15 +341,28 @@ class Generator:
             column[:] = direction[kept, axis]
         np.multiply(charge[kept], np.int8(MU_PLUS), out=muons.pdg_id)
 
-    def _try(self) -> None:
-        """Refuse a model that fails at the ends or in the middle of its latents."""
-        latent = np.repeat(np.linspace(-1, 1, 5, dtype=np.float32)[:, None], self.model.latent_size, axis=1)
+    @classmethod
+    def _try_memory(cls, contents: bytes, model: Model) -> None:
+        """Refuse a model of which a block of muons takes too much memory, before it is loaded for good."""
+        from deepmuon_runtime.model.contract import check_signature
+        from deepmuon_runtime.model.trial import open_for_trial, returning_memory
+
+        session = open_for_trial(contents, model.name)
+        check_signature(session, model)
+        generator = cls(session, model, "cpu", threads=1)
+        for draws in (TRIED, generator._block_draws):
+            generator._try(draws, returning_memory())
+
+    def _try(self, draws: int, options: onnxruntime.RunOptions | None = None) -> None:
+        """Refuse a model that fails at the ends or in the middle of its latents, in so many draws."""
+        values = np.resize(np.linspace(-1, 1, TRIED, dtype=np.float32), draws)
+        latent = np.repeat(values[:, None], self.model.latent_size, axis=1)
         muons = Muons.empty(len(latent) * self.model.muons_per_draw)
 
         def run() -> Outputs:
             from deepmuon_runtime.model.contract import INPUT, OUTPUTS
 
-            energy, direction, charge = self._session.run(OUTPUTS, {INPUT: latent})
+            energy, direction, charge = self._session.run(OUTPUTS, {INPUT: latent}, options)
             if not len(energy) == len(direction) == len(charge) == len(muons):
                 raise ValueError(
                     f"it gave {len(energy)} energies, {len(direction)} directions and {len(charge)} charges, "
@@ -366,12 +385,6 @@ def _block_draws(model: Model, device: str) -> int:
     return -(-BLOCK[device] // (step * size)) * step
 
 
-def _command_line() -> str:
-    """Return the command that runs, for a shell; of a name that is no text the bytes are escaped."""
-    program, *arguments = getattr(sys, "argv", None) or [""]  # a program that embeds Python may give none
-    return shlex.join([Path(program).name, *arguments]).encode("utf-8", "backslashreplace").decode("utf-8")
-
-
 def _usable_processors() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
@@ -390,18 +403,3 @@ def checked_numbers(n: float, first: float = 0) -> range:
 
 def _seed(seed: int | None) -> int:
     return new_seed() if seed is None else checked_seed(seed)
-
-
-def _check_space(folder: Path, n: int) -> None:
-    needed = n * BYTES_PER_MUON
-    free = shutil.disk_usage(folder).free
-    if needed > free:
-        raise RefusedError(f"{n:,} muons need {_readable(needed)}, and {folder} has {_readable(free)} free")
-
-
-def _readable(size: float) -> str:
-    for unit in ("bytes", "kB", "MB", "GB", "TB"):
-        if size < 1000:
-            return f"{size:.3g} {unit}"
-        size /= 1000
-    return f"{size:.3g} PB"

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import RefusedError, first_line
 from deepmuon_runtime.model.device import open_session
-from deepmuon_runtime.model.family import at_depth, read_model, with_metadata
+from deepmuon_runtime.model.family import at_depth, with_metadata
 from deepmuon_runtime.model.metadata import HORIZONTAL_PLANE
-from deepmuon_runtime.model.onnx_file import check_onnx_file
-from deepmuon_runtime.model.opening import open_model
+from deepmuon_runtime.model.opening import checked_model, load_model
 from deepmuon_runtime.model.protobuf import field, parts, varint_field, with_changed
 
 __all__ = ["bake"]
@@ -44,13 +43,12 @@ def bake(contents: bytes, depth_m: float, surface: int = HORIZONTAL_PLANE, name:
     Raises
     ------
     RefusedError
-        As `open_model` and `at_depth`, or if the nodes whose names begin with `depth/` need latents or make other than
-        float32, int32 or int64.
+        As `checked_model`, `load_model` and `at_depth`, or if the nodes whose names begin with `depth/` need latents or
+        make other than float32, int32 or int64.
     """
-    check_onnx_file(contents, name)
-    family = read_model(contents, name)
-    placed = at_depth(contents, depth_m, surface, name)
-    _, model, _ = open_model(placed, name, "cpu")
+    _, family = checked_model(contents, name)
+    placed, model = checked_model(at_depth(contents, depth_m, surface, name), name)
+    _, model, _ = load_model(placed, model, "cpu")
     rate, uncertainty = model.rate_hz_per_m2, model.rate_uncertainty_hz_per_m2
     said = {
         "depth_min_m": None,
@@ -68,7 +66,7 @@ def bake(contents: bytes, depth_m: float, surface: int = HORIZONTAL_PLANE, name:
         fixed = with_metadata(with_changed(memoryview(placed), GRAPH_OF_MODEL, baked), said)
     except UnicodeDecodeError as error:
         raise RefusedError(f"{name} can't be baked: the name of a node is no text in UTF-8") from error
-    open_model(fixed, name, "cpu")
+    load_model(*checked_model(fixed, name), "cpu")
     return fixed
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import onnxruntime
 
-from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.errors import RefusedError, shown
 from deepmuon_runtime.model.metadata import Model
 
 __all__ = ["INPUT", "OUTPUTS", "RATE", "check_signature"]
@@ -46,11 +46,12 @@ def _check_nodes(
     expected = {**expected, **{key: value for key, value in (optional or {}).items() if key in found}}
     if found.keys() != expected.keys():
         raise RefusedError(
-            f"{name} breaks the contract: its {role}s are {', '.join(found)}, and should be {', '.join(expected)}"
+            f"{name} breaks the contract: its {role}s are {shown(', '.join(found))}, "
+            f"and should be {', '.join(expected)}"
         )
     for node, (kind, shape) in expected.items():
         if found[node] != (kind, shape):
             raise RefusedError(
-                f"{name} breaks the contract: its {role} {node} is {found[node][0]} {found[node][1]}, "
+                f"{name} breaks the contract: its {role} {node} is {found[node][0]} {shown(str(found[node][1]))}, "
                 f"and should be {kind} {shape}"
             )

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.errors import RefusedError, shown
 from deepmuon_runtime.latents.stream import model_stream
 
 __all__ = [
@@ -253,4 +253,6 @@ def _value(name: str, key: str, text: str, rule: _Rule) -> Any:
             return value
     except ValueError:
         pass
-    raise RefusedError(f"{name} breaks the contract: {METADATA_PREFIX}{key} is {text!r}, and should be {rule.meaning}")
+    raise RefusedError(
+        f"{name} breaks the contract: {METADATA_PREFIX}{key} is {shown(repr(text))}, and should be {rule.meaning}"
+    )

@@ -17,7 +17,7 @@ from deepmuon_runtime.model.family import at_depth, read_model
 from deepmuon_runtime.model.metadata import Model, is_rate
 from deepmuon_runtime.model.onnx_file import check_onnx_file
 
-__all__ = ["RATE_DIGITS", "RATE_ROUNDING", "open_model", "read_file"]
+__all__ = ["RATE_DIGITS", "RATE_ROUNDING", "checked_model", "load_model", "read_file"]
 
 LARGEST_MODEL = 2**31 - 1  # bytes: the limit of protobuf, and so of an ONNX file without external data
 
@@ -34,8 +34,8 @@ def read_file(path: Path) -> bytes:
     RefusedError
         If it is no file, too large, or can't be read.
     """
-    if path.is_dir() or (path.exists() and not path.is_file()):
-        raise RefusedError(f"{path} is no ONNX file")
+    if path.exists() and not path.is_file():
+        raise RefusedError(f"{path} is no ONNX file: it is a folder, a pipe or a device")
     try:
         if path.stat().st_size > LARGEST_MODEL:
             raise RefusedError(f"{path} is no ONNX file: it is larger than 2 GB")
@@ -45,10 +45,8 @@ def read_file(path: Path) -> bytes:
         raise RefusedError(f"the model {path} can't be read: {reason}") from error
 
 
-def open_model(
-    contents: bytes, name: str, device: str, depth_m: float | None = None
-) -> tuple[onnxruntime.InferenceSession, Model, str]:
-    """Load a model that keeps the contract.
+def checked_model(contents: bytes, name: str, depth_m: float | None = None) -> tuple[bytes, Model]:
+    """Look through a model file before ONNX Runtime sees it, and write the wanted depth into it if it is a family.
 
     Parameters
     ----------
@@ -56,26 +54,46 @@ def open_model(
         An ONNX file.
     name
         What to call it in an error.
-    device
-        As for `open_session`.
     depth_m
         Of a family, the wanted depth; the one that stands in it if left out.
 
     Returns
     -------
-    The session; the model at its depth, with the hash and size of `contents` as they are; and the device that it took.
+    What is to be loaded, and the model at its depth, with the hash and size of `contents` as they were.
 
     Raises
     ------
     RefusedError
-        If it breaks the contract, has no such depth, or the device can't be had.
+        If it may not be run, says of itself what can't be, or has no such depth.
     """
     check_onnx_file(contents, name)
-    model = shipped = read_model(contents, name)
-    if shipped.is_family or depth_m is not None:
-        contents = at_depth(contents, shipped.depth_m if depth_m is None else depth_m, shipped.surface, name)
-        model = replace(read_model(contents, name), sha256=shipped.sha256, size=shipped.size)
-    session, device = open_session(contents, name, device)
+    shipped = read_model(contents, name)
+    if depth_m is None and not shipped.is_family:
+        return contents, shipped
+    contents = at_depth(contents, shipped.depth_m if depth_m is None else depth_m, shipped.surface, name)
+    return contents, replace(read_model(contents, name), sha256=shipped.sha256, size=shipped.size)
+
+
+def load_model(contents: bytes, model: Model, device: str) -> tuple[onnxruntime.InferenceSession, Model, str]:
+    """Load a model that keeps the contract.
+
+    Parameters
+    ----------
+    contents, model
+        As `checked_model` gives them.
+    device
+        As for `open_session`.
+
+    Returns
+    -------
+    The session, the model with the rate of its depth, and the device that it took.
+
+    Raises
+    ------
+    RefusedError
+        If it breaks the contract, or the device can't be had.
+    """
+    session, device = open_session(contents, model.name, device)
     check_signature(session, model)
     return session, _with_rate(session, model), device
 

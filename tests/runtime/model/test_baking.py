@@ -18,7 +18,7 @@ from support.tiny_families import tiny_family, tiny_tables
 from deepmuon_runtime import Generator, RefusedError
 from deepmuon_runtime.model.baking import bake
 from deepmuon_runtime.model.family import at_depth
-from deepmuon_runtime.model.opening import open_model
+from deepmuon_runtime.model.opening import checked_model, load_model
 
 DEPTHS = [0, 13.7, 50, 100]
 
@@ -128,4 +128,4 @@ def test_a_damaged_family_is_refused_or_baked_to_a_model_that_keeps_the_contract
     """A model that does not is refused by `bake` itself."""
     damaged = DAMAGES[number](tiny_family(), np.random.default_rng(seed))
     with contextlib.suppress(RefusedError):
-        assert open_model(bake(damaged, 10), "baked", "cpu")[1].depth_m == 10
+        assert load_model(*checked_model(bake(damaged, 10), "baked"), "cpu")[1].depth_m == 10

@@ -20,7 +20,7 @@ from support.tiny_models import tiny_model
 from deepmuon_runtime import Generator, RefusedError
 from deepmuon_runtime.latents.philox import latents
 from deepmuon_runtime.model.family import at_depth, depth_text
-from deepmuon_runtime.model.opening import open_model
+from deepmuon_runtime.model.opening import checked_model, load_model
 
 depths = st.floats(0, 100, width=32)
 
@@ -113,7 +113,7 @@ def test_the_rate_is_that_of_the_depth_with_its_relative_uncertainty(family_file
     model = Generator.open(depth, file=family_file).model
     assert model.rate_hz_per_m2 == pytest.approx(tiny_rate(depth), rel=1e-5)
     assert model.rate_uncertainty_hz_per_m2 == pytest.approx(0.002 * tiny_rate(depth), rel=1e-2)
-    _, sphere, _ = open_model(at_depth(family_file.read_bytes(), depth, 1), "a family", "cpu")
+    _, sphere, _ = load_model(*checked_model(at_depth(family_file.read_bytes(), depth, 1), "a family"), "cpu")
     assert sphere.rate_hz_per_m2 == pytest.approx(tiny_rate(depth, 1), rel=1e-5)
 
 
@@ -137,7 +137,7 @@ def test_the_hash_and_size_are_those_of_the_file_as_it_was_shipped_whatever_the_
 def test_two_depths_have_streams_of_their_own_and_so_have_two_surfaces(family_file: Path):
     contents = family_file.read_bytes()
     streams = {
-        open_model(at_depth(contents, depth, surface), "a family", "cpu")[1].stream
+        load_model(*checked_model(at_depth(contents, depth, surface), "a family"), "cpu")[1].stream
         for depth in (0, 10, 13.7)
         for surface in (0, 1)
     }
