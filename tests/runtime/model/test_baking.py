@@ -70,7 +70,7 @@ def test_its_bytes_are_the_same_each_time_and_from_whatever_depth_the_family_had
 def test_a_sphere_is_baked_too(tmp_path: Path):
     model = opened(tmp_path, bake(tiny_family(), 13.7, 1)).model
     assert (model.surface, model.metadata["surface"]) == (1, "1")
-    assert model.rate_hz_per_m2 == pytest.approx(112.736, rel=1e-5)  # between 150 and 14 at 27.4 %
+    assert model.rate_hz_per_m2 == pytest.approx(112.736, rel=1e-4)  # between 150 and 14 at 27.4 %
 
 
 def left_after_loading(contents: bytes, folder: Path) -> list[tuple[str, ...]]:
