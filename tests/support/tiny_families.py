@@ -28,6 +28,7 @@ RATE = np.float32([[[110], [10], [2]], [[150], [14], [3]]])  # /(m2 s)
 FAMILY = {
     **METADATA,
     "contract_version": "2",
+    "depth_m": "10",
     "flux": "test",
     "medium": "water",
     "surface": "0",
