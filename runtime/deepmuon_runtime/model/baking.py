@@ -52,6 +52,7 @@ def bake(contents: bytes, depth_m: float, surface: int = HORIZONTAL_PLANE, name:
     said = {
         "depth_min_m": None,
         "depth_max_m": None,
+        "knots_m": None,
         "surface": str(model.surface),
         "rate_hz_per_m2": None if rate is None else repr(rate),
         "rate_uncertainty_hz_per_m2": None if uncertainty is None else repr(uncertainty),
