@@ -116,6 +116,7 @@ class Generator:
         """
         from deepmuon_runtime.model.contract import check_signature, contract_metadata
         from deepmuon_runtime.model.device import open_session
+        from deepmuon_runtime.model.family import at_depth
         from deepmuon_runtime.model.onnx_file import check_onnx_file
 
         threads = _usable_processors() if threads is None else threads
@@ -127,9 +128,11 @@ class Generator:
             released = released_model(depth, architecture)
             name, content = released.name, read_released(released)
         else:
-            if depth is not None or architecture is not None:
-                raise RefusedError("a model's file decides its depth and architecture: give the file alone")
+            if architecture is not None:
+                raise RefusedError("a model's file decides its architecture: give the file alone")
             name, content = str(file), _read_model(Path(file))
+            if depth is not None:
+                content = at_depth(content, depth)
         check_onnx_file(content, name)
         session, device = open_session(content, name, device)
         sha256 = hashlib.sha256(content).hexdigest()

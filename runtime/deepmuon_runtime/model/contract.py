@@ -1,4 +1,4 @@
-"""Whether a loaded model keeps the ONNX contract, version 1."""
+"""Whether a loaded model keeps the ONNX contract, version 2."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import onnxruntime
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.model.metadata import METADATA_PREFIX, Model
 
-__all__ = ["INPUT", "OUTPUTS", "check_signature", "contract_metadata"]
+__all__ = ["INPUT", "OUTPUTS", "RATE", "check_signature", "contract_metadata"]
 
 INPUT = "latent"
 OUTPUTS = ("kinetic_energy", "direction", "charge")
+RATE = "rate_hz_per_m2"
 
 _Nodes = dict[str, tuple[str, list[str | int]]]  # name: type, shape
 
@@ -44,7 +45,10 @@ def check_signature(session: onnxruntime.InferenceSession, model: Model) -> None
         charge: ("tensor(int8)", ["muons"]),
     }
     _check_nodes(model.name, "input", session.get_inputs(), inputs)
-    _check_nodes(model.name, "output", session.get_outputs(), outputs)
+    found = session.get_outputs()
+    if any(node.name == RATE for node in found):
+        outputs[RATE] = ("tensor(float)", [1])
+    _check_nodes(model.name, "output", found, outputs)
 
 
 def _check_nodes(

@@ -15,7 +15,7 @@ from deepmuon_runtime.latents.stream import model_stream
 
 __all__ = ["CONTRACT_VERSION", "LARGEST_DRAW", "LATENTS_PER_MUON", "METADATA_PREFIX", "Model", "is_name"]
 
-CONTRACT_VERSION = 1
+CONTRACT_VERSION = 2
 
 LARGEST_DRAW = 1 << 17
 """The most muons of a draw: the smallest run of the network makes as many."""

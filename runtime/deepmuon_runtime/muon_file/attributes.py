@@ -76,6 +76,7 @@ WHERE_KNOWN = {
     "rate_hz_per_m2": POSITIVE,
     "rate_uncertainty_hz_per_m2": NOT_NEGATIVE,
     "variance_factor": POSITIVE,
+    "flux": NAME,
     "live_time_s_m2": NOT_NEGATIVE,
     "live_time_s": POSITIVE,
     "area_m2": POSITIVE,

@@ -146,6 +146,7 @@ def write_sea_level(
         source="parametric flux of EcoMug (NIM A 1014 (2021) 165732), 1 MeV to 100 TeV",
         provenance=(f"{n} muons drawn, {charge_ratio:g} mu+ for each mu-, seed {seed}",),
         rate=plane_rate(),
+        flux="ecomug",
     )
     with MuonWriter(path, sample.attributes, overwrite) as writer:
         for k in range(-(-n // PIECE)):

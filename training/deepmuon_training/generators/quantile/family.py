@@ -1,0 +1,175 @@
+"""A family of `quantile` maps: tables at knots of depth, interpolated to those of any depth, in PyTorch and in ONNX.
+
+The graph does so in nodes that depend on constants alone, and goes on from there as the graph of one depth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from onnx import TensorProto
+
+from deepmuon_runtime.errors import RefusedError
+from deepmuon_training.export.graph import Graph
+from deepmuon_training.families.knots import Knots, column_density_graph, risen_graph
+from deepmuon_training.families.rates import KnownRate, Rates
+from deepmuon_training.families.sphere import TriangularMap, through_sphere
+from deepmuon_training.generators.quantile.cells import column_logits, energy_logits, row_logits, row_place
+from deepmuon_training.generators.quantile.graph import LATENT_SIZE, NEAREST_HORIZON, quantile_graph
+from deepmuon_training.generators.quantile.tables import QuantileTables
+
+__all__ = ["QuantileFamily", "quantile_family"]
+
+_TABLES = ("energy", "zenith", "charge")
+
+
+@dataclass(frozen=True)
+class QuantileFamily:
+    """Tables at knots of depth; make one by `quantile_family`.
+
+    Parameters
+    ----------
+    depths
+        Of the knots in metres, ascending.
+    density
+        Of the overburden in g/cm3.
+    planes, spheres
+        Each knot's tables, of the flux through a horizontal plane and through a sphere.
+    rates
+        Of both surfaces, or None where unknown.
+    """
+
+    depths: tuple[float, ...]
+    density: float
+    planes: tuple[QuantileTables, ...]
+    spheres: tuple[QuantileTables, ...]
+    rates: Rates | None
+
+    architecture = "quantile"
+    latent_size = LATENT_SIZE
+    muons_per_draw = 1
+    surfaces = (0, 1)
+
+    @property
+    def energy_range(self) -> tuple[float, float]:
+        """Lowest and highest kinetic energy [GeV] at any depth."""
+        lows, highs = zip(*(knot.energy_range for knot in self.planes), strict=True)
+        return min(lows), max(highs)
+
+    @cached_property
+    def _knots(self) -> Knots:
+        return Knots(self.depths, self.density)
+
+    @cached_property
+    def _stacks(self) -> dict[str, NDArray[np.float32]]:
+        """Tables by name, each [surfaces x knots, numbers]."""
+        return {name: _stack([getattr(knot, name) for knot in (*self.planes, *self.spheres)]) for name in _TABLES}
+
+    def at(self, depth_m: float, surface: int = 0) -> QuantileTables:
+        """Return the tables at a depth, in double precision."""
+        used, weights = self._knots.weights(depth_m)
+        used = used + surface * len(self.depths)
+        like = self.planes[0]
+        energy, zenith, charge = (
+            (weights @ self._stacks[name][used].astype(np.float64)).reshape(getattr(like, name).shape)
+            for name in _TABLES
+        )
+        return replace(
+            like,
+            energy=np.maximum.accumulate(energy),
+            zenith=np.maximum.accumulate(zenith, axis=1),
+            charge=np.clip(charge, -1, 1),
+            energy_range=self.energy_range,
+        )
+
+    def rate(self, depth_m: float, surface: int = 0) -> float | None:
+        """Return the rate at a depth, per m2 of the plane or of the sphere's projected area; None where unknown."""
+        return None if self.rates is None else self.rates(depth_m, surface)
+
+    def graph(self) -> tuple[Graph, str, str, str, str | None]:
+        """Build the same in ONNX; returns the graph and the names of energy, direction, charge, and rate if known."""
+        g = Graph()
+        depth = g.changeable(np.array(self.depths[0], dtype=np.float32), "depth_m")
+        surface = g.changeable(np.array(self.surfaces[0], dtype=np.int32), "surface")
+        with g.scope("depth"):
+            surface = g("Cast", surface, to=TensorProto.INT64)
+            x = column_density_graph(g, depth, self.density)
+            used, weights = self._knots.weights_graph(g, x)
+            used = g("Add", used, g("Mul", surface, np.array(len(self.depths), dtype=np.int64)))
+            energy, zenith, charge = (self._table(g, name, used, weights) for name in _TABLES)
+            rate = None if self.rates is None else self.rates.graph(g, x, surface)
+        return g, *quantile_graph(g, energy, zenith, charge, self.energy_range), rate
+
+    def _table(self, g: Graph, name: str, used: str, weights: str) -> str:
+        stack, shape = self._stacks[name], getattr(self.planes[0], name).shape
+        table = g("MatMul", weights, g("Gather", g.constant(stack, f"depth/{name}"), used, axis=0))
+        matrix = shape if len(shape) == 2 else (1, *shape)
+        table = g("Reshape", table, np.array(matrix, dtype=np.int64))
+        table = g("Clip", table, -1.0, 1.0) if name == "charge" else risen_graph(g, table, matrix[1])
+        if matrix != shape:
+            table = g("Reshape", table, np.array(shape, dtype=np.int64))
+        return g.named(table, f"{name}/table")
+
+
+def quantile_family(
+    knots: Sequence[tuple[float, QuantileTables]], density: float, rates: Sequence[KnownRate]
+) -> QuantileFamily:
+    """Make a family of tables.
+
+    Parameters
+    ----------
+    knots
+        Depth in metres and tables of each, ascending; two or more.
+    density
+        Of the overburden in g/cm3.
+    rates
+        Through a horizontal plane, ascending in depth, from that of the first knot to that of the last; empty where
+        they are unknown.
+
+    Raises
+    ------
+    RefusedError
+        If an azimuth is not uniform.
+    """
+    for depth, tables in knots:
+        if tables.azimuth is not None:
+            raise RefusedError(
+                f"the generator of {depth:g} m has a learned azimuth, which is not interpolated in depth: fit each "
+                "with --azimuth uniform"
+            )
+    depths, planes = zip(*knots, strict=True)
+    spheres = tuple(_sphere(plane)[0] for plane in planes)
+    family = QuantileFamily(depths, density, planes, spheres, None)
+    if not rates:
+        return family
+    plane_rates = np.array([known.rate for known in rates])
+    means = np.array([_sphere(family.at(known.depth_m))[1] for known in rates])
+    both = np.stack([plane_rates, plane_rates * means])
+    return replace(family, rates=Rates([known.depth_m for known in rates], both, density))
+
+
+def _sphere(plane: QuantileTables) -> tuple[QuantileTables, float]:
+    """Return the tables of the flux through a sphere, and the mean of 1 / cos zenith."""
+    t = energy_logits()
+    *tables, mean = through_sphere(
+        TriangularMap(
+            t=t.numpy(),
+            energy=plane.energy.astype(np.float64),
+            row=row_place(t.numpy()),
+            row_t=row_logits().numpy(),
+            column=column_logits().numpy(),
+            zenith=plane.zenith.astype(np.float64),
+            charge=plane.charge.astype(np.float64),
+            least_cosine=NEAREST_HORIZON,
+        )
+    )
+    energy, zenith, charge = (table.astype(np.float32) for table in tables)
+    return replace(plane, energy=energy, zenith=zenith, charge=charge), mean
+
+
+def _stack(tables: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
+    return np.stack([table.reshape(-1) for table in tables])
