@@ -72,6 +72,10 @@ class Family(Protocol):
     def surfaces(self) -> tuple[int, ...]:
         """0 for a horizontal plane, 1 for a sphere."""
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What its users should know."""
+
     def at(self, depth_m: float, surface: int) -> Exportable:
         """Return the generator of a depth, for an evaluation in PyTorch in double precision."""
 

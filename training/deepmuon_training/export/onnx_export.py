@@ -50,6 +50,14 @@ class Mismatch:
     direction: float
     charges: int
 
+    @property
+    def note(self) -> str:
+        """Say it in a sentence."""
+        return (
+            f"ONNX Runtime differs from PyTorch in double precision by at most {self.energy:.1e} of the energy and "
+            f"{self.direction:.1e} of a direction, on 100,000 muons."
+        )
+
 
 def export(generator: Exportable, training: Training, path: Path, *, overwrite: bool = False) -> Mismatch:
     """Write an ONNX file, after comparing its output with PyTorch's on 100,000 muons.

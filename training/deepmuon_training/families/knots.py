@@ -6,7 +6,7 @@ surface the spectrum changes over decimetres, and in the deep over many metres. 
 through the four nearest (Lagrange's), so that at a knot there is nothing but its own map.
 
 Knots are stored as x = density x depth + 0.7, and differences of s are logarithms of ratios of x: at a knot that is
-ln 1, exactly 0 in every runtime.
+ln 1, exactly 0 in every runtime, and all weights but one are 0.
 """
 
 from __future__ import annotations
@@ -87,7 +87,8 @@ class Knots:
         used = start + self._points
         difference = np.log(x / self.x[used].astype(np.float64))
         others = np.where(np.eye(len(used)) == 1, 1.0, difference)
-        return used, np.prod(others, axis=1) * self._scale[start]
+        weights = np.prod(others, axis=1) * self._scale[start]
+        return used, weights / weights.sum()
 
     def weights_graph(self, g: Graph, x: str) -> tuple[str, str]:
         """Build the same in ONNX, of a scalar x: int64 [p] and float32 [1, p]."""
@@ -106,4 +107,6 @@ class Knots:
             products.append(product)
         scale = g("Gather", self._scale.astype(np.float32), start, axis=0)
         weights = g("Mul", g("Concat", *products, axis=0), scale)
+        # Else rounding, a part in a million of the sum, would be one of ln E itself and not of what knots differ by.
+        weights = g("Div", weights, g("ReduceSum", weights, np.array([0], dtype=np.int64), keepdims=1))
         return used, g("Reshape", weights, np.array([1, points], dtype=np.int64))

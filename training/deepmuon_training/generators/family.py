@@ -36,13 +36,24 @@ class FittedFamily:
     rates
         By which the rate of any depth is known, ascending; empty where it is not.
     notes
-        What its users should know.
+        What its users should know: of the family, and of its knots.
     """
 
     family: Family
     knots: tuple[Training, ...]
     rates: tuple[KnownRate, ...]
     notes: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """Say what it is in a line."""
+        top, bottom = self.knots[0], self.knots[-1]
+        rate = "unknown rate"
+        if self.rates:
+            rate = f"{self.rates[0].rate:.2f} to {self.rates[-1].rate:.2f} muons per m2 and s"
+        return (
+            f"{self.family.architecture}, {len(self.knots)} knots from {top.depth_m:g} to {bottom.depth_m:g} m of "
+            f"{bottom.medium}, {rate}"
+        )
 
     @one_thread()
     def export(self, path: Path, *, overwrite: bool = False) -> Mismatch:
@@ -79,7 +90,7 @@ def family_of(generators: Sequence[FittedGenerator], more_rates: Sequence[KnownR
         tables.append((knot.training.depth_m, numbers))
         notes += [f"{knot.training.depth_m:g} m: {note}" for note in (*knot.notes, *differences)]
     family = kind.family(tables, density(trainings[-1].medium), rates)
-    return FittedFamily(family, trainings, rates, tuple(notes))
+    return FittedFamily(family, trainings, rates, (*family.notes, *notes))
 
 
 def check_knots(architectures: Sequence[str], trainings: Sequence[Training]) -> None:

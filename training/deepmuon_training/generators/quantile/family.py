@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 from onnx import TensorProto
 
@@ -25,6 +26,9 @@ from deepmuon_training.generators.quantile.tables import QuantileTables
 __all__ = ["QuantileFamily", "quantile_family"]
 
 _TABLES = ("energy", "zenith", "charge")
+
+_COMPARED = 20_000
+"""Muons whose maps are compared."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +94,19 @@ class QuantileFamily:
         """Return the rate at a depth, per m2 of the plane or of the sphere's projected area; None where unknown."""
         return None if self.rates is None else self.rates(depth_m, surface)
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Tell how far the map of each knot is from what the other knots make of it."""
+        if len(self.depths) < 3:
+            return ("There is no knot between the first and the last: how good the depths between are can't be told.",)
+        inner = [_left_out(self, number) for number in range(1, len(self.depths) - 1)]
+        depth, energy, cosine = max(inner, key=lambda found: found[1])
+        return (
+            f"Of the knots between the first and the last, that of {depth:g} m is hardest to interpolate from its "
+            f"neighbours: its muons would differ by {energy:.1%} of the energy and {cosine:.4f} of cos zenith (rms). "
+            "Between knots that is less.",
+        )
+
     def graph(self) -> tuple[Graph, str, str, str, str | None]:
         """Build the same in ONNX; returns the graph and the names of energy, direction, charge, and rate if known."""
         g = Graph()
@@ -150,6 +167,18 @@ def quantile_family(
     means = np.array([_sphere(family.at(known.depth_m))[1] for known in rates])
     both = np.stack([plane_rates, plane_rates * means])
     return replace(family, rates=Rates([known.depth_m for known in rates], both, density))
+
+
+def _left_out(family: QuantileFamily, number: int) -> tuple[float, float, float]:
+    """Return the depth of a knot, and how far muons are from its own if it is left out: rms, as in the notes."""
+    own, others = family.planes[number], [k for k in range(len(family.depths)) if k != number]
+    depths, planes = tuple(family.depths[k] for k in others), tuple(family.planes[k] for k in others)
+    guess = replace(family, depths=depths, planes=planes, spheres=planes, rates=None).at(family.depths[number])
+    latent = 2 * torch.rand(_COMPARED, LATENT_SIZE, generator=torch.Generator().manual_seed(0), dtype=torch.float64) - 1
+    with torch.no_grad():
+        (energy, direction, _), (own_energy, own_direction, _) = guess(latent), own(latent)
+    ratio, turn = torch.log(energy / own_energy), direction[:, 2] - own_direction[:, 2]
+    return family.depths[number], float((ratio**2).mean().sqrt()), float((turn**2).mean().sqrt())
 
 
 def _sphere(plane: QuantileTables) -> tuple[QuantileTables, float]:
