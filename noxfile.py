@@ -29,7 +29,8 @@ nox.options.sessions = [
     "runtime-3.10",
     "runtime-3.12",
     "runtime-3.13",  # tests cover 3.11
-    "oldest",
+    "trust",
+    "onnxruntimes",
 ]
 
 REPOSITORY = Path(__file__).parent
@@ -158,11 +159,16 @@ def readme(session: nox.Session) -> None:
     check_main_job(session, muons)
 
 
-@nox.session(python="3.10")
-def oldest(session: nox.Session) -> None:
-    """Open the released models in the oldest ONNX Runtime that can: ``nox -s oldest``."""
-    session.install("onnxruntime==1.17.3", "numpy<2")
-    session.run("python", "tests/models/open_in_oldest_onnxruntime.py", str(REPOSITORY / "models" / "deepmuon_models"))
+@nox.session(python=PYTHON)
+def onnxruntimes(session: nox.Session) -> None:
+    """Run the released models in every ONNX Runtime that contract and package allow: ``nox -s onnxruntimes``."""
+    session.run("python", "tests/models/open_in_each_onnxruntime.py", f"{session.create_tmp()}/one")
+
+
+@nox.session(python=False, requires=["environment"])
+def trust(session: nox.Session) -> None:
+    """Try faults and damaged files for a few minutes: ``nox -s trust -- --hours 1 --seed 7``."""
+    run(session, "python", "-m", "studies.trust.run", *(session.posargs or ("--hours", "0.05")))
 
 
 def run(session: nox.Session, program: str, *arguments: str, **variables: str) -> None:

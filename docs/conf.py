@@ -16,11 +16,13 @@ copyright = f"2026, {author}"
 release = version = version_of("deepmuon-runtime")
 
 extensions = [
+    "click_examples",
     "floor_plan",
     "include_all",
     "live_page",
     "mathml",
     "myst_parser",
+    "quality",
     "released_models",
     "score_summary",
     "sphinx.ext.autodoc",
@@ -44,5 +46,7 @@ html_theme = "furo"
 html_favicon = "images/favicon.svg"
 html_title = f"DeepMuon {version}"
 html_math_renderer = "mathml"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = False

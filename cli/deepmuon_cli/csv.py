@@ -49,7 +49,8 @@ def csv(
 
     Columns: kinetic energy in GeV or MeV; direction of motion u, v, w, a unit vector, z up; pdg_id, 13 for mu- and -13
     for mu+. Nine digits keep every number as it is in the file. What the file says of its muons stands above them in
-    lines that begin with #.
+    lines that begin with #. A damaged file gives no text: for stdout it is read twice, and verified before the first
+    line.
 
     For PHITS (s-type = 17) a line holds particle, x, y, z in cm, u, v, w, energy in MeV, weight, and time:
 
@@ -60,7 +61,9 @@ def csv(
     from deepmuon_runtime.files.output import check_output
     from deepmuon_runtime.files.whole import whole_file
     from deepmuon_runtime.latents.philox import new_seed
-    from deepmuon_runtime.views.text import csv_pieces, phits_pieces
+    from deepmuon_runtime.muon_file.reader import read_attributes, verify_muons
+    from deepmuon_runtime.room import check_disk
+    from deepmuon_runtime.views.text import SHORTEST_LINE, csv_pieces, phits_pieces
 
     if side is None:
         texts = csv_pieces(file, unit=units, header=not no_header)
@@ -70,9 +73,12 @@ def csv(
         raise RefusedError(f"a square of {side:g} m has no place for muons: --phits takes a length above 0")
     pieces = (text.encode() for text in texts)
     if str(output) == "-":
+        verify_muons(file, progress=lambda _: show_life())
         _print(pieces)
         return
-    check_output(output, overwrite, [file])
+    folder = check_output(output, overwrite, [file]).parent
+    number = read_attributes(file)["count"]
+    check_disk(folder, number * SHORTEST_LINE, f"{number:,} lines")
     with whole_file(output, overwrite=overwrite) as text:
         for piece in pieces:
             text.write(piece)

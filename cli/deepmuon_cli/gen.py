@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 import click
+from click.core import ParameterSource
 
 from deepmuon_cli.options.completion import architectures, depths, devices
 from deepmuon_cli.options.mistyped import HelpfulCommand
@@ -64,6 +67,9 @@ VALUES = {
     "-o": r".*\.(h5|hdf5|csv|root|txt)",
 }
 """What a word looks like whose option was forgotten."""
+
+RECORDED = ("depth", "architecture", "number", "live_time", "area", "seed", "shard", "device", "threads")
+"""The options that a file records: numbers and names of ours. Names of files are not: they could hold a secret."""
 
 
 @click.command(
@@ -120,7 +126,9 @@ VALUES = {
 @click.option("-q", "--quiet", is_flag=True, help="No progress bar and no closing line.")
 @click.option("--list", "list_only", is_flag=True, help="List the released models.")
 @click.version_option(package_name="deepmuon-runtime", prog_name=NAME, message="%(prog)s %(version)s")
+@click.pass_context
 def gen(
+    context: click.Context,
     depth: float | None,
     architecture: str | None,
     model: Path | None,
@@ -181,16 +189,16 @@ def gen(
         raise click.UsageError("where to? Give the name of a file: -o muons.h5")
 
     from deepmuon_runtime import Generator, new_seed
-    from deepmuon_runtime.files.output import check_output
     from deepmuon_runtime.latents.shard import WHOLE_RUN
+    from deepmuon_runtime.muon_file.output import check_muon_output
 
-    check_output(output, overwrite, [] if model is None else [model])
+    check_muon_output(output, overwrite, [] if model is None else [model])
     generator = Generator.open(depth, architecture, file=model, device=device, threads=threads)
     seed = new_seed() if seed is None else seed
-    attributes = {}
+    attributes: dict[str, object] = {"command_line": _command_line(context)}
     if live_time is not None and area is not None:
         number = generator.number_in_live_time(live_time, area, seed)
-        attributes = {"live_time_s": live_time, "area_m2": area}
+        attributes |= {"live_time_s": live_time, "area_m2": area}
     assert number is not None
     shard = shard or WHOLE_RUN
     count = len(shard.numbers(number))
@@ -229,6 +237,16 @@ def _check_number_options(number: int | None, live_time: float | None, area: flo
         raise click.UsageError("how many muons? Give -n (as in -n 1e7), or --live-time and --area")
     if number is not None and live_time is not None:
         raise click.UsageError("-n goes without --live-time: the live time decides the number")
+
+
+def _command_line(context: click.Context) -> str:
+    """Return the command with those of its options that may be recorded."""
+    given = [
+        (option.opts[-1], str(context.params[option.name]))
+        for option in context.command.params
+        if option.name in RECORDED and context.get_parameter_source(option.name) == ParameterSource.COMMANDLINE
+    ]
+    return shlex.join([NAME, *chain.from_iterable(given)])
 
 
 def _print_models() -> None:

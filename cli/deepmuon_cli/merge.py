@@ -32,7 +32,7 @@ def merge(shards: tuple[Path, ...], output: Path, overwrite: bool, virtual: bool
     muons that are in two of them are refused.
 
     With --virtual nothing is copied: HDF5 finds the muons in the shards, by their paths relative to the folder of
-    the new file, so that they are moved together or not at all.
+    the new file, so that they are moved together or not at all. The shards are read once, and damaged ones refused.
 
     \b
         deepmuon-merge --virtual part-1.h5 part-2.h5 part-3.h5 -o muons.h5

@@ -10,12 +10,14 @@
 The pattern is relative to the page. A file begins with its title; with ``section`` the title stays and of what
 follows only the section with that heading. With ``pictures``, after NAME.md come those in that folder's NAME/.
 Pictures that a file shows itself are found beside it. No match is no error.
+With ``folded``, each file is a line that opens at a click, and its headings are none of the page's.
 """
 
 from __future__ import annotations
 
 import os
 import re
+from html import escape
 from pathlib import Path
 from typing import ClassVar
 
@@ -34,7 +36,11 @@ class IncludeAll(SphinxDirective):
     """The directive."""
 
     required_arguments = 1
-    option_spec: ClassVar = {"section": directives.unchanged_required, "pictures": directives.unchanged_required}
+    option_spec: ClassVar = {
+        "section": directives.unchanged_required,
+        "pictures": directives.unchanged_required,
+        "folded": directives.flag,
+    }
 
     def run(self) -> list[nodes.Node]:
         """Parse the files as sections of the page."""
@@ -45,7 +51,10 @@ class IncludeAll(SphinxDirective):
             beside = Path(os.path.relpath(file.parent, folder)).as_posix()
             shown = PICTURE.sub(rf"\g<1>{beside}/\g<2>", self.text(file))
             text = "\n\n".join([shown, *self.pictures(folder, file.stem)])
-            found += self.parse_text_to_nodes(text, allow_section_headings=True)
+            if "folded" in self.options:
+                found += _folded(self.parse_text_to_nodes(text))  # where headings are no sections
+            else:
+                found += self.parse_text_to_nodes(text, allow_section_headings=True)
         return found
 
     def text(self, file: Path) -> str:
@@ -62,7 +71,16 @@ class IncludeAll(SphinxDirective):
         if "pictures" not in self.options:
             return []
         pictures = sorted((folder / self.options["pictures"] / name).glob("*.png"))
-        return [f"![{_alt(picture.stem, name)}]({picture.relative_to(folder).as_posix()})" for picture in pictures]
+        shown = [f"![{_alt(picture.stem, name)}]({picture.relative_to(folder).as_posix()})" for picture in pictures]
+        return ["\n".join(shown)] if shown else []
+
+
+def _folded(parsed: list[nodes.Node]) -> list[nodes.Node]:
+    """Return a text, the first of whose nodes is its title, as one that opens at a click on that."""
+    title, *rest = parsed
+    name = title.astext()
+    start = f'<details class="card" id="{nodes.make_id(name)}"><summary>{escape(name)}</summary>'
+    return [nodes.raw("", start, format="html"), *rest, nodes.raw("", "</details>", format="html")]
 
 
 def _alt(quantity: str, name: str) -> str:

@@ -5,7 +5,8 @@
 The tank is 10 m deep and 20 m x 20 m wide, the sphere in its middle has a radius of 2 m. Muons are drawn from the
 released model of --depth, and Geant4 carries them through the tank, with the sphere and without. Then it is measured
 how many muons a second of computing brings to the tank's top: drawn from that model; or drawn from the one of sea
-level, on an area of 200 m x 200 m, and carried through the water above the tank.
+level, on an area of 200 m x 200 m, and carried through the water above the tank. 10,000 muons take about half a minute
+of computing, shared by the cores, and so 200,000 about five minutes on two.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 
-__all__ = ["DeepMuonError", "FailedError", "RefusedError", "first_line", "reason"]
+__all__ = ["DeepMuonError", "FailedError", "RefusedError", "first_line", "reason", "shown"]
 
 
 class DeepMuonError(Exception):
@@ -23,7 +23,12 @@ class FailedError(DeepMuonError):
 def first_line(error: Exception) -> str:
     """Return the first line of another library's error, or what sort of error it is where that has no text."""
     lines = str(error).strip().splitlines()
-    return lines[0] if lines else type(error).__name__
+    return shown(lines[0], 300) if lines else type(error).__name__
+
+
+def shown(text: str, most: int = 60) -> str:
+    """Return a text of a stranger's file, cut so that an error stays a line that can be read."""
+    return text if len(text) <= most else f"{text[:most]}... ({len(text)} characters)"
 
 
 def reason(error: BaseException) -> str:

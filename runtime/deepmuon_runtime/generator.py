@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import collections.abc
-import hashlib
 import os
-import shlex
-import shutil
-import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
@@ -20,17 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import FailedError, RefusedError, first_line
-from deepmuon_runtime.files.output import check_output
 from deepmuon_runtime.latents.philox import checked_seed, fill_latents, new_seed
 from deepmuon_runtime.latents.poisson import poisson
 from deepmuon_runtime.latents.shard import WHOLE_RUN, Shard
 from deepmuon_runtime.model.metadata import LATENTS_PER_MUON, Model
 from deepmuon_runtime.model.released import read_released, released_model
 from deepmuon_runtime.muon_file.format import BYTES_PER_MUON
+from deepmuon_runtime.muon_file.output import check_muon_output
 from deepmuon_runtime.muon_file.writer import MuonWriter
 from deepmuon_runtime.muons import MU_PLUS, Muons
 from deepmuon_runtime.ordered_map import ordered_map
 from deepmuon_runtime.physical import check_physical
+from deepmuon_runtime.room import check_disk, check_memory
 
 if TYPE_CHECKING:
     import onnxruntime
@@ -45,7 +42,7 @@ LARGEST_NUMBER = 2**53
 # Muons of one run of the network, about: what it works on stays in a CPU's cache; a GPU wants much at once.
 BLOCK = {"cpu": 1 << 14, "cuda": 1 << 18}
 PIECE = {"cpu": 1 << 17, "cuda": 1 << 18}  # muons of one task of a thread, and of one write, in whole blocks
-LARGEST_MODEL = 2**31 - 1  # bytes: the limit of protobuf, and so of an ONNX file without external data
+TRIED = 5  # values of the latents, before the first muons: the ends, the middle, and two between
 
 Outputs = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int8]]  # energy, direction, charge
 
@@ -99,11 +96,12 @@ class Generator:
         Parameters
         ----------
         depth
-            Metres of water above the muons.
+            Metres of water above the muons. Of a family, any number in its range; that of a file has its medium, and
+            the depth that stands in it if left out.
         architecture
             "quantile" or "transformer"; the default one if left out.
         file
-            An ONNX file, instead of `depth` and `architecture`.
+            An ONNX file, instead of a released model.
         device
             "cpu"; "cuda"; or "auto", which is CUDA where it can be had, else the CPU.
         threads
@@ -112,34 +110,29 @@ class Generator:
         Raises
         ------
         RefusedError
-            If there is no such model, it breaks the contract, or the device can't be had.
+            If there is no such model or depth, it breaks the contract, or the device can't be had.
         """
-        from deepmuon_runtime.model.contract import check_signature, contract_metadata
-        from deepmuon_runtime.model.device import open_session
-        from deepmuon_runtime.model.family import at_depth
-        from deepmuon_runtime.model.onnx_file import check_onnx_file
+        from deepmuon_runtime.model.opening import checked_model, load_model, read_file
 
         threads = _usable_processors() if threads is None else threads
         if not isinstance(threads, Integral) or threads < 1:
             raise RefusedError(f"{threads!r} threads can't make muons: 1 or more can")
-        if file is None:
+        if file is not None:
+            if architecture is not None:
+                raise RefusedError("a model's file decides its architecture: give the file, and of a family a depth")
+            name, contents = str(file), read_file(Path(file))
+        else:
             if depth is None:
                 raise RefusedError("which model? Give the depth of a released one, or the file of another")
             released = released_model(depth, architecture)
-            name, content = released.name, read_released(released)
-        else:
-            if architecture is not None:
-                raise RefusedError("a model's file decides its architecture: give the file alone")
-            name, content = str(file), _read_model(Path(file))
-            if depth is not None:
-                content = at_depth(content, depth)
-        check_onnx_file(content, name)
-        session, device = open_session(content, name, device)
-        sha256 = hashlib.sha256(content).hexdigest()
-        model = Model.from_metadata(contract_metadata(session, name), name, sha256, len(content))
-        check_signature(session, model)
+            name, contents = released.name, read_released(released)
+            depth = depth if released.is_family else None
+        contents, model = checked_model(contents, name, depth)
+        if file is not None:
+            cls._try_memory(contents, model)
+        session, model, device = load_model(contents, model, device)
         generator = cls(session, model, device, threads)
-        generator._try()
+        generator._try(TRIED)
         return generator
 
     def sample(self, n: int, seed: int | None = None, *, first: int = 0) -> Muons:
@@ -166,10 +159,12 @@ class Generator:
             If the model gives an unphysical muon.
         """
         numbers, seed = checked_numbers(n, first), _seed(seed)
+        instead = "take them in chunks, or write a file"
+        check_memory(len(numbers) * BYTES_PER_MUON, f"{n} muons", instead)
         try:
             muons = Muons.empty(len(numbers))
         except (MemoryError, ValueError) as error:
-            raise RefusedError(f"{n} muons do not fit in memory: take them in chunks, or write a file") from error
+            raise RefusedError(f"{n} muons do not fit in memory: {instead}") from error
 
         def fill(part: range) -> None:
             self._fill(muons[part.start - numbers.start : part.stop - numbers.start], seed, part.start)
@@ -242,7 +237,8 @@ class Generator:
         """
         total, seed = len(checked_numbers(n)), _seed(seed)
         numbers = shard.numbers(total)
-        _check_space(check_output(path, overwrite).parent, len(numbers))
+        folder = check_muon_output(path, overwrite).parent
+        check_disk(folder, len(numbers) * BYTES_PER_MUON, f"{len(numbers):,} muons")
         described = {**self._attributes(seed, shard, total), **(attributes or {})}
         chunks = self.chunks(len(numbers), seed, first=numbers.start)
         with MuonWriter(path, described, overwrite) as writer, closing(chunks):
@@ -296,7 +292,6 @@ class Generator:
             "model_sha256": model.sha256,
             "architecture": model.architecture,
             "device": self.device,
-            "command_line": _command_line(),
             **{name: rate for name, rate in rates.items() if rate is not None},
         }
 
@@ -336,7 +331,9 @@ class Generator:
         try:
             energy, direction, charge = run()
         except Exception as error:  # ONNX Runtime's own classes have no common base
-            reason = first_line(error)
+            from deepmuon_runtime.model.trial import memory_asked
+
+            reason = memory_asked(error) or first_line(error)
             raise FailedError(f"the model {self.model.name} failed: {reason}") from error
         kept = slice(skipped, skipped + len(muons))
         muons.kinetic_energy[:] = energy[kept]
@@ -344,15 +341,28 @@ class Generator:
             column[:] = direction[kept, axis]
         np.multiply(charge[kept], np.int8(MU_PLUS), out=muons.pdg_id)
 
-    def _try(self) -> None:
-        """Refuse a model that fails at the ends or in the middle of its latents."""
-        latent = np.repeat(np.linspace(-1, 1, 5, dtype=np.float32)[:, None], self.model.latent_size, axis=1)
+    @classmethod
+    def _try_memory(cls, contents: bytes, model: Model) -> None:
+        """Refuse a model of which a block of muons takes too much memory, before it is loaded for good."""
+        from deepmuon_runtime.model.contract import check_signature
+        from deepmuon_runtime.model.trial import open_for_trial, returning_memory
+
+        session = open_for_trial(contents, model.name)
+        check_signature(session, model)
+        generator = cls(session, model, "cpu", threads=1)
+        for draws in (TRIED, generator._block_draws):
+            generator._try(draws, returning_memory())
+
+    def _try(self, draws: int, options: onnxruntime.RunOptions | None = None) -> None:
+        """Refuse a model that fails at the ends or in the middle of its latents, in so many draws."""
+        values = np.resize(np.linspace(-1, 1, TRIED, dtype=np.float32), draws)
+        latent = np.repeat(values[:, None], self.model.latent_size, axis=1)
         muons = Muons.empty(len(latent) * self.model.muons_per_draw)
 
         def run() -> Outputs:
             from deepmuon_runtime.model.contract import INPUT, OUTPUTS
 
-            energy, direction, charge = self._session.run(OUTPUTS, {INPUT: latent})
+            energy, direction, charge = self._session.run(OUTPUTS, {INPUT: latent}, options)
             if not len(energy) == len(direction) == len(charge) == len(muons):
                 raise ValueError(
                     f"it gave {len(energy)} energies, {len(direction)} directions and {len(charge)} charges, "
@@ -367,30 +377,12 @@ class Generator:
             raise RefusedError(f"{self.model.name} breaks the contract in a trial: {error}") from error
 
 
-def _read_model(path: Path) -> bytes:
-    if path.is_dir() or (path.exists() and not path.is_file()):
-        raise RefusedError(f"{path} is no ONNX file")
-    try:
-        if path.stat().st_size > LARGEST_MODEL:
-            raise RefusedError(f"{path} is no ONNX file: it is larger than 2 GB")
-        return path.read_bytes()
-    except (OSError, ValueError) as error:
-        reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else str(error)
-        raise RefusedError(f"the model {path} can't be read: {reason}") from error
-
-
 def _block_draws(model: Model, device: str) -> int:
     """Return how many draws make a block: of large ones, which each thread has in memory, as few as one."""
     size = max(model.muons_per_draw, model.latent_size // LATENTS_PER_MUON)
     # Multiples of 8 draws where they fit: a block then begins with a whole step of the random number generator.
     step = 8 if 8 * size <= BLOCK[device] else 1
     return -(-BLOCK[device] // (step * size)) * step
-
-
-def _command_line() -> str:
-    """Return the command that runs, for a shell; of a name that is no text the bytes are escaped."""
-    program, *arguments = getattr(sys, "argv", None) or [""]  # a program that embeds Python may give none
-    return shlex.join([Path(program).name, *arguments]).encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def _usable_processors() -> int:
@@ -411,18 +403,3 @@ def checked_numbers(n: float, first: float = 0) -> range:
 
 def _seed(seed: int | None) -> int:
     return new_seed() if seed is None else checked_seed(seed)
-
-
-def _check_space(folder: Path, n: int) -> None:
-    needed = n * BYTES_PER_MUON
-    free = shutil.disk_usage(folder).free
-    if needed > free:
-        raise RefusedError(f"{n:,} muons need {_readable(needed)}, and {folder} has {_readable(free)} free")
-
-
-def _readable(size: float) -> str:
-    for unit in ("bytes", "kB", "MB", "GB", "TB"):
-        if size < 1000:
-            return f"{size:.3g} {unit}"
-        size /= 1000
-    return f"{size:.3g} PB"

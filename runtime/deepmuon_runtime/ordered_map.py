@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import chain
 from typing import TypeVar
+
+from deepmuon_runtime.memory_limit import affordable
 
 __all__ = ["ordered_map"]
 
@@ -27,14 +30,36 @@ def ordered_map(
     items
         Taken one by one as they are needed.
     threads
-        How many run side by side. As many results again may wait for the caller, and 8 at most.
+        How many run side by side; fewer where the system refuses to start so many, or the memory is limited, and none
+        but the caller's at worst.
+        As many results again may wait for the caller, and 8 at most.
     """
+    rest = iter(items)
+    threads = affordable(threads)
+    while threads:
+        refused: list[Item] = []
+        yield from _mapped(function, rest, threads, refused)
+        if not refused:
+            return
+        rest = chain(refused, rest)
+        threads //= 2
+    yield from map(function, rest)
+
+
+def _mapped(
+    function: Callable[[Item], Result], items: Iterator[Item], threads: int, refused: list[Item]
+) -> Generator[Result, None, None]:
+    """Do so by exactly so many threads; where one can't be started, stop and leave its item in `refused`."""
     pending: deque[Future[Result]] = deque()
     most = threads + min(threads, LARGEST_LEAD)
     pool = ThreadPoolExecutor(threads, thread_name_prefix="muons")
     try:
         for item in items:
-            pending.append(pool.submit(function, item))
+            try:
+                pending.append(pool.submit(function, item))
+            except RuntimeError:
+                refused.append(item)
+                break
             if len(pending) > most:
                 yield pending.popleft().result()
         while pending:

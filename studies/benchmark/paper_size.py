@@ -11,10 +11,10 @@ from pathlib import Path
 
 import torch
 
-from deepmuon_training.data.ecomug import sea_level_muons
 from deepmuon_training.energy_transform import EnergyTransform
 from deepmuon_training.export.metadata import Training
 from deepmuon_training.export.onnx_export import export
+from deepmuon_training.fluxes.ecomug import sea_level_muons
 from deepmuon_training.generators.transformer.model import ChargeTable, TransformerModel, radius_table
 from deepmuon_training.generators.transformer.network import Transformer
 from deepmuon_training.learning.charge import ChargeProbability

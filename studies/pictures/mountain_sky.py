@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from deepmuon_runtime import Generator, Muons
-from deepmuon_training.data.ecomug import sea_level_muons
+from deepmuon_training.fluxes.ecomug import sea_level_muons
 from deepmuon_training.generators.fit import fit_generator
 from deepmuon_training.generators.fitted import FittedGenerator, export_fitted
 from deepmuon_training.generators.quantile.azimuth_fit import AZIMUTH_SCHEDULE

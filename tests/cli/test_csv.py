@@ -131,6 +131,8 @@ def test_a_file_of_no_muon_is_a_header(csv, tmp_path):
         (["muons.h5"], "Missing option '-o'"),
         (["muons.h5", "-o", "no/muons.csv"], "there is no folder"),
         (["muons.h5", "-o", "."], "is a folder"),
+        (["muons.h5", "-o", "a" * 300], "can't be written: File name too long"),
+        (["a" * 300, "-o", "muons.csv"], "can't be read as a muon file: File name too long"),
         (["muons.h5", "-o", "muons.csv", "--units", "keV"], "'keV' is not one of"),
     ],
 )

@@ -14,7 +14,7 @@ import pytest
 from support.tiny_models import RARELY_BAD, tiny_model
 
 from deepmuon_cli.gen import main
-from deepmuon_cli.process.ending import SIGNALS
+from deepmuon_cli.process.signals import SIGNALS
 from deepmuon_runtime import Generator, Muons, read_attributes, read_muons
 
 COMMAND = [sys.executable, "-m", "deepmuon_cli.gen"]
@@ -56,7 +56,7 @@ def test_the_main_job_gives_the_muons_of_the_model_and_says_so(gen):
     expected = Generator.open(10).sample(1000, seed=7)
     assert np.array_equal(read_muons("muons.h5").kinetic_energy, expected.kinetic_energy)
     attributes = read_attributes("muons.h5")
-    assert attributes["command_line"] == "deepmuon-gen --depth 10 -n 1_000 -o muons.h5 --seed 7"
+    assert attributes["command_line"] == "deepmuon-gen --depth 10.0 --number 1000 --seed 7"
     assert attributes["live_time_s_m2"] == 1000 / 55.5
 
 
@@ -68,6 +68,42 @@ def test_two_depths_of_a_seed_have_nothing_in_common(gen):
         assert gen("--depth", depth, "-n", n, "--seed", 1, "-o", f"{depth}.h5")[0] == 0
     energies = [np.log(read_muons(f"{depth}.h5").kinetic_energy) for depth in (0, 10)]
     assert abs(np.corrcoef(energies)[0, 1]) < 4 / np.sqrt(n)
+
+
+def test_no_name_of_a_file_is_recorded(gen, model_file):
+    """It could hold a secret, and the model is known by its hash."""
+    secret = model_file.rename(model_file.with_name("secret.onnx"))
+    assert gen("--model", secret, "-n", 10, "--threads", 1, "-q", "-o", "secret.h5") == (0, "", "")
+    assert read_attributes("secret.h5")["command_line"] == "deepmuon-gen --number 10 --threads 1"
+    with open("secret.h5", "rb") as file:
+        assert b"secret" not in file.read()
+
+
+@pytest.mark.parametrize(
+    ("output", "reason"),
+    [
+        (
+            "-",
+            "- is no name of a muon file, which can't go to stdout: give one, as in -o muons.h5, and then",
+        ),
+        ("/dev/stdout", "/dev/stdout is a device or a pipe: give the name of a regular file"),
+        (
+            "muons.csv",
+            "muons.csv would be HDF5 under a name of text: write muons.h5, and then deepmuon-csv muons.h5",
+        ),
+        ("muons.root", "muons.root would be HDF5 under a name of ROOT: write muons.h5, and then read it in Python"),
+        ("muons.parquet", "muons.parquet would be HDF5 under a name of Parquet"),
+        ("muons.mcpl", "muons.mcpl would be HDF5 under a name of MCPL"),
+    ],
+)
+def test_an_output_that_promises_what_is_not_hdf5_is_refused(tmp_path, model_file, output, reason):
+    """With stdout a pipe."""
+    words = [*COMMAND, "--model", str(model_file), "-n", "10", "-o", output]
+    before = set(tmp_path.iterdir())
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert reason in done.stderr
+    assert set(tmp_path.iterdir()) == before
 
 
 def test_a_model_of_ones_own_is_taken_from_its_file(gen, model_file):

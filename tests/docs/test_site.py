@@ -22,6 +22,5 @@ def test_every_module_of_training_is_in_the_reference():
     paths = [path.relative_to(folder).with_suffix("") for path in folder.rglob("[a-z]*.py")]
     modules = {".".join(path.parts) for path in paths if path.parts[0] != "commands"}
     modules -= {"transport.geant4_materials", "transport.geant4_slab"}
-    modules -= {"mountain", "smoothing_plot"}  # pictures of the docs
     reference = (REPOSITORY / "docs" / "python_training.md").read_text(encoding="utf-8")
     assert set(re.findall(r"automodule:: deepmuon_training\.([\w.]+)", reference)) == modules

@@ -46,3 +46,18 @@ def test_an_error_comes_in_its_turn_and_ends_the_rest():
     with pytest.raises(ValueError, match="three"):
         collect()
     assert done == [0, 1, 2]
+
+
+@pytest.mark.parametrize("started", range(5))
+def test_where_the_system_starts_fewer_threads_the_results_are_the_same(monkeypatch, started):
+    """As many as the limit of processes leaves, down to none."""
+    start, alive = threading.Thread.start, []
+
+    def start_few(thread: threading.Thread) -> None:
+        if sum(other.is_alive() for other in alive) >= started:
+            raise RuntimeError("can't start new thread")
+        alive.append(thread)
+        start(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", start_few)
+    assert list(ordered_map(lambda item: item * item, range(40), 4)) == [item * item for item in range(40)]

@@ -13,11 +13,11 @@ from hypothesis import settings
 from numpy.typing import NDArray
 
 from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
-from deepmuon_training.data.ecomug import plane_rate, sea_level_muons
 from deepmuon_training.energy_transform import EnergyTransform
 from deepmuon_training.export.exportable import Exportable
 from deepmuon_training.export.metadata import Training
 from deepmuon_training.export.onnx_export import export
+from deepmuon_training.fluxes.ecomug import plane_rate, sea_level_muons
 from deepmuon_training.generators.quantile.fit import QuantileSchedules, fit_quantile
 from deepmuon_training.generators.quantile.maps import QuantileGenerator
 from deepmuon_training.generators.quantile.regression import RegressionSteps

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import kurtosis
 
-from deepmuon_training.data.ecomug import sea_level_muons
 from deepmuon_training.energy_transform import EnergyTransform, box_cox, inverse_box_cox
+from deepmuon_training.fluxes.ecomug import sea_level_muons
 
 ENERGIES = np.geomspace(1e-3, 1e5, 100_001).astype(np.float32)  # 1 MeV to 100 TeV
 MEANS = st.floats(2.5, 5.0)  # 3.1 at sea level, 3.4 under 50 m of water

@@ -1,9 +1,7 @@
 from __future__ import annotations
 
-import io
-import sys
-
 import pytest
+from support.terminal import terminal
 from tqdm import tqdm
 
 from deepmuon_training.progress import progress_bar
@@ -45,10 +43,8 @@ def test_what_is_short_or_hidden_leaves_no_line(capsys, seconds, hidden):
 
 
 def test_a_terminal_gets_a_bar_that_is_written_over(monkeypatch):
-    terminal = io.StringIO()
-    terminal.isatty = lambda: True
-    monkeypatch.setattr(sys, "stderr", terminal)
+    shown = terminal(monkeypatch)
     with progress_bar(10, "learning", " steps", hidden=False) as bar:
         bar.update(10)
-    assert "\r" in terminal.getvalue()
+    assert "\r" in shown.getvalue()
     assert isinstance(bar, tqdm)

@@ -87,6 +87,16 @@ def test_a_sample_is_not_overwritten_unless_asked_for(tmp_path):
     assert read_sample(path).source == "third"
 
 
+def test_a_damaged_file_is_refused_as_a_whole_and_not_in_part(tmp_path):
+    path = tmp_path / "sample.h5"
+    write_sample(path, Sample(MUONS, depth_m=10.0, source="the tests"))
+    with h5py.File(path, "r+") as file:
+        file["muons/kinetic_energy"][1] *= 2
+    with pytest.raises(RefusedError, match="is damaged: the column kinetic_energy is not what was written"):
+        read_sample(path)
+    assert len(read_sample(path, 0, 1)) == 1
+
+
 def test_a_change_is_added_to_the_provenance():
     first = Sample(MUONS, depth_m=0.0, source="the tests", provenance=("made",), rate=100.0)
     second = first.then("halved", rate=50.0)
@@ -201,6 +211,23 @@ def test_a_column_of_crys_of_another_shape_or_type_is_refused(cry, column):
     with h5py.File(cry, "r+") as file:
         file["muons/kinetic_energy"] = column
     with pytest.raises(RefusedError, match="is no CRY sample"):
+        read_cry(cry)
+
+
+@pytest.mark.parametrize("how", ["external storage", "a link", "no chunk"])
+def test_a_column_of_crys_that_is_not_in_its_file_is_refused(cry, tmp_path, how):
+    (tmp_path / "secret").write_bytes(b"pass" * 6)
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["u"] = CRY["u"]
+    without(cry, "u")
+    with h5py.File(cry, "r+") as file:
+        if how == "external storage":
+            file["muons"].create_dataset("u", (6,), "f4", external=[(str(tmp_path / "secret"), 0, 24)])
+        elif how == "a link":
+            file["muons"]["u"] = h5py.ExternalLink("other.h5", "/u")
+        else:
+            file["muons"].create_dataset("u", (6,), "f4", chunks=(2,))
+    with pytest.raises(RefusedError, match=r"is no CRY sample .*column u"):
         read_cry(cry)
 
 

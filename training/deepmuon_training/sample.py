@@ -84,7 +84,7 @@ class Sample:
 
 
 def read_sample(path: str | Path, first: int = 0, count: int | None = None) -> Sample:
-    """Read a sample, or a part of it, from a muon file of version 1.
+    """Read a sample, or a part of it, from a muon file. The whole of it is verified by its checksums, a part can't be.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def read_sample(path: str | Path, first: int = 0, count: int | None = None) -> S
     Raises
     ------
     RefusedError
-        If the file is no such file, or does not hold the muons asked for.
+        If the file is no muon file or a damaged one, or does not hold the muons asked for.
     """
     return sample_of(read_muons(path, first, count), read_attributes(path))
 
@@ -122,7 +122,7 @@ def sample_of(muons: Muons, attributes: Mapping[str, Any]) -> Sample:
 
 
 def write_sample(path: str | Path, sample: Sample, *, overwrite: bool = False) -> None:
-    """Write a sample as a muon file of version 1.
+    """Write a sample as a muon file.
 
     Raises
     ------

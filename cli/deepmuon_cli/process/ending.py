@@ -26,14 +26,16 @@ from typing import Any, NoReturn
 
 import click
 
+from deepmuon_cli.process.lack import lack
+from deepmuon_cli.process.limits import is_memory_limited
+from deepmuon_cli.process.signals import Echo, answer, ignore, let_through
 from deepmuon_cli.process.stdout import ReaderGoneError, watched_stdout
 
-__all__ = ["DEFECTIVE", "REFUSED", "SIGNALS", "complain", "run"]
+__all__ = ["DEFECTIVE", "FAILED", "REFUSED", "complain", "run"]
 
 FAILED = 1
 REFUSED = 2
 DEFECTIVE = 3
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 MOMENT = 0.02  # s, after which a signal that got lost comes again
 
@@ -94,6 +96,7 @@ class _Stopping:
         self._number: int | None = None  # the first signal
         self._is_quiet = False  # an exception is on its way, or all is done
         self._is_done = False
+        self._echo = Echo(self._stop)
         self._report_unraisable = sys.unraisablehook
 
     def outcome(self, function: Callable[[], tuple[int, str]]) -> tuple[int, str]:
@@ -111,14 +114,13 @@ class _Stopping:
 
     def _begin(self) -> None:
         sys.unraisablehook = self._unraisable
-        for number in SIGNALS:
-            if signal.getsignal(number) is not signal.SIG_IGN:  # as for a job in the background, or of nohup
-                signal.signal(number, self._stop)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+        answer(self._stop)
+        let_through()
 
     def _end(self) -> None:
         self._is_quiet = self._is_done = True
-        signal.setitimer(signal.ITIMER_REAL, 0)
+        self._echo.end()
+        ignore()
 
     def _stop(self, number: int, frame: FrameType | None) -> None:
         if self._is_quiet:
@@ -126,13 +128,12 @@ class _Stopping:
         self._is_quiet = True
         if self._number is None:
             self._number = number
-            signal.signal(signal.SIGALRM, self._stop)
         raise _Stopped(self._lost)
 
     def _lost(self) -> None:
         if not self._is_done:
             self._is_quiet = False
-            signal.setitimer(signal.ITIMER_REAL, MOMENT)
+            self._echo.sound(MOMENT)
 
     def _unraisable(self, unraisable: Any) -> None:
         if not isinstance(unraisable.exc_value, _Stopped):
@@ -150,12 +151,16 @@ def _outcome(command: click.Command, name: str) -> tuple[int, str]:
         return REFUSED, " ".join(error.format_message().split())
     except ReaderGoneError:
         return 128 + signal.SIGPIPE, ""
-    except OSError as error:  # a folder that vanished at that moment
-        return FAILED, str(error)
     except Exception as error:
-        from deepmuon_runtime.errors import FailedError, RefusedError
-
-        if isinstance(error, (FailedError, RefusedError)):
-            return (REFUSED if isinstance(error, RefusedError) else FAILED), str(error)
+        known = sys.modules.get("deepmuon_runtime.errors")  # without it, nobody has raised one of its errors
+        is_known = known is not None and isinstance(error, known.DeepMuonError)
+        lacking = lack(error)
+        # A damaged file may ask for any memory: only where there is a limit an error of it is no fault of the file.
+        if lacking and (is_memory_limited() or not is_known):
+            return FAILED, lacking
+        if known is not None and is_known:
+            return (REFUSED if isinstance(error, known.RefusedError) else FAILED), str(error)
+        if isinstance(error, OSError):  # a folder that vanished at that moment
+            return FAILED, str(error)
         raise
     return code or 0, ""

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+
+from deepmuon_runtime.files.flush import flush, flush_data
 
 __all__ = ["EarlyFlush"]
 
 STEP = 1 << 26  # bytes between two flushes: what is left for the last one takes a disk a moment
-
-# Of a growing file, what fdatasync leaves out (times of change) does not matter until the last flush.
-_flush_data = getattr(os, "fdatasync", os.fsync)  # macOS lacks it
 
 
 class EarlyFlush:
@@ -44,7 +43,8 @@ class EarlyFlush:
             return
         self._raise_failure()
         self._waiting = 0
-        self._flush = self._thread.submit(_flush_data, self._descriptor)
+        with suppress(RuntimeError):  # the system starts no thread for it: the last flush has more to do
+            self._flush = self._thread.submit(flush_data, self._descriptor)
 
     def finish(self) -> None:
         """Wait until all that was written is on the disk.
@@ -55,7 +55,7 @@ class EarlyFlush:
             If that fails, or an earlier flush has.
         """
         self._raise_failure()
-        os.fsync(self._descriptor)
+        flush(self._descriptor)
 
     def close(self) -> None:
         """Wait for a flush that is under way, and end the thread."""

@@ -37,8 +37,10 @@ def check_output(path: str | Path, overwrite: bool = False, inputs: Iterable[str
         target = Path(os.path.realpath(path))
         if target.is_dir():
             raise RefusedError(f"{path} is a folder: give the name of a file in it")
-        if target.exists() and not target.is_file():
-            raise RefusedError(f"{path} is a device or a pipe, and HDF5 needs a regular file")
+        if target.is_symlink():  # after all links were followed
+            raise RefusedError(f"{path} is a symbolic link that leads back to itself: give another name")
+        if Path(path).exists() and not Path(path).is_file():  # that of /dev/stdout leads to a name that is none
+            raise RefusedError(f"{path} is a device or a pipe: give the name of a regular file")
         if target.exists() and any(os.path.exists(read) and target.samefile(read) for read in inputs):
             raise RefusedError(f"{path} is read here, and would be replaced: give the output another name")
         if target.exists() and not overwrite:

@@ -7,7 +7,6 @@ its writer, and only then linked to its name: under that name there is a complet
 
 from __future__ import annotations
 
-import fcntl
 import os
 import re
 import secrets
@@ -18,6 +17,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from deepmuon_runtime.errors import FailedError, reason
+from deepmuon_runtime.files.folder import Folder
+from deepmuon_runtime.files.lock import is_abandoned, lock
 from deepmuon_runtime.files.output import check_output
 from deepmuon_runtime.files.publish import publish
 
@@ -58,15 +59,29 @@ class PartialFile:
     def begin(self) -> None:
         """Warn of what dead writers left, and see to it that this one leaves nothing: before the first byte."""
         _warn_of_leftovers(self.target)
-        self._remove = weakref.finalize(self, _remove, self.path)  # at the latest when the process ends
+        self._folder = Folder(self.target.parent)
+        self._held: list[int] = []
+        # At the latest when the process ends.
+        self._remove = weakref.finalize(self, _remove, self._folder, self.path.name, self._held)
 
     def hold(self, descriptor: int) -> None:
-        """Mark the temporary file, which is open, as one whose writer is alive."""
-        with suppress(OSError):  # a file system without locks
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        """Mark the temporary file, which is open, as one whose writer is alive, and remember which file it is."""
+        held = lock(descriptor)
+        if held is not None:
+            self._held.append(held)
 
     def publish(self) -> None:
-        """Give the file, which is complete and on disk, its name; errors are those of `publish.publish`."""
+        """Give the file, which is complete, on disk and closed, its name.
+
+        Raises
+        ------
+        FailedError
+            If it is not what lies under the temporary name any more.
+        OSError
+            As `publish.publish`.
+        """
+        if any(not self._folder.contains(self.path.name, descriptor) for descriptor in self._held):
+            raise FailedError(f"{self.target} was not written: {self.path.name} was exchanged or removed meanwhile")
         publish(self.path, self.target, self._overwrite)
 
     def remove(self) -> None:
@@ -95,7 +110,7 @@ def _warn_of_leftovers(target: Path) -> None:
     pattern = re.compile(re.escape(target.name) + r"\.[0-9a-f]{8}" + re.escape(PARTIAL_SUFFIX))
     names: list[str] = []
     with suppress(OSError), os.scandir(target.parent) as entries:  # a folder that may be written but not read
-        names = sorted(entry.name for entry in entries if pattern.fullmatch(entry.name) and _is_abandoned(entry.path))
+        names = sorted(entry.name for entry in entries if pattern.fullmatch(entry.name) and is_abandoned(entry.path))
     if names:
         others = f" and {len(names) - 1} more" if len(names) > 1 else ""
         warnings.warn(
@@ -104,20 +119,9 @@ def _warn_of_leftovers(target: Path) -> None:
         )
 
 
-def _is_abandoned(path: str) -> bool:
-    try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW)
-    except OSError:
-        return False
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except OSError:  # locked, or no telling
-        return False
-    finally:
+def _remove(folder: Folder, name: str, held: list[int]) -> None:
+    if all(folder.contains(name, descriptor) for descriptor in held):  # else it is somebody else's by now
+        folder.remove(name)
+    folder.close()
+    for descriptor in held:
         os.close(descriptor)
-    return True
-
-
-def _remove(path: Path) -> None:
-    with suppress(OSError):  # never made, already in its place, or its folder is gone
-        path.unlink()

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-import errno
 import os
+import stat
 import warnings
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from deepmuon_runtime.errors import reason
+from deepmuon_runtime.files.folder import flush_names
 
-__all__ = ["publish"]
+__all__ = ["CONDITIONS", "publish"]
+
+CONDITIONS: list[Callable[[], object]] = []
+"""Called before a file gets its name: a program appends what shall keep a file from that, by raising FailedError."""
 
 
 def publish(partial: Path, target: Path, overwrite: bool) -> None:
@@ -22,7 +28,7 @@ def publish(partial: Path, target: Path, overwrite: bool) -> None:
     target
         The name it gets.
     overwrite
-        Whether a file of that name is replaced.
+        Whether a file of that name is replaced, whose mode it then takes.
 
     Raises
     ------
@@ -31,7 +37,11 @@ def publish(partial: Path, target: Path, overwrite: bool) -> None:
     OSError
         If the file system refuses otherwise. Then the name is not given.
     """
+    for check in CONDITIONS:
+        check()
     if overwrite:
+        with suppress(OSError):  # there is none, or no modes
+            os.chmod(partial, stat.S_IMODE(os.stat(target).st_mode))
         os.replace(partial, target)
     else:
         _link(partial, target)
@@ -42,28 +52,34 @@ def _link(source: Path, target: Path) -> None:
     """Give the complete file its name, unless the name is taken: then raise FileExistsError."""
     try:
         os.link(source, target)
-    except OSError as error:
-        if error.errno not in (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK):
+    except FileExistsError:
+        if not _is_same(source, target):  # over NFS a link that was made, and asked for again, is reported as taken
             raise
-        # A file system without hard links (FAT, some network ones): reserve the name, then move over it.
-        os.close(os.open(target, os.O_CREAT | os.O_EXCL))
-        try:
-            os.replace(source, target)
-        except BaseException:
-            os.unlink(target)
-            raise
+    except (OSError, AttributeError):  # FAT, file systems of networks, a system without links: each says it otherwise
+        _move(source, target)
+
+
+def _is_same(source: Path, target: Path) -> bool:
+    try:
+        return os.path.samestat(os.lstat(source), os.lstat(target))
+    except OSError:
+        return False
+
+
+def _move(source: Path, target: Path) -> None:
+    """Do the same without links: reserve the name, then move over it."""
+    os.close(os.open(target, os.O_CREAT | os.O_EXCL))
+    try:
+        os.replace(source, target)
+    except BaseException:
+        os.unlink(target)
+        raise
 
 
 def _flush_name_to_disk(target: Path) -> None:
     """Make the name of a file survive a loss of power; warn where that fails, for the file is there."""
     try:
-        descriptor = os.open(target.parent, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
-    except PermissionError:  # a folder that may be written but not read
-        pass
+        flush_names(target.parent)
     except OSError as error:
         warnings.warn(
             f"{target} is complete, but a loss of power now might take its name: {reason(error)}", stacklevel=2

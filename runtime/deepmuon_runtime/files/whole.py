@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
+from deepmuon_runtime.files.flush import flush
 from deepmuon_runtime.files.partial import PartialFile
 
 __all__ = ["whole_file", "write_whole"]
@@ -39,7 +39,7 @@ def whole_file(path: str | Path, *, overwrite: bool = False) -> Iterator[BinaryI
                 partial.hold(file.fileno())
                 yield file
                 file.flush()
-                os.fsync(file.fileno())
+                flush(file.fileno())
             partial.publish()
     finally:
         partial.remove()

@@ -9,8 +9,8 @@ change, unlike the methods of its Generator.
 
 from __future__ import annotations
 
+import operator
 import secrets
-from numbers import Real
 
 import numpy as np
 from numpy.random import Philox
@@ -53,13 +53,15 @@ def new_seed() -> int:
     return secrets.randbits(63)
 
 
-def checked_seed(seed: float) -> int:
+def checked_seed(seed: int) -> int:
     """Return the seed if it is one, a whole number from 0 to 2^64 - 1, else raise RefusedError."""
-    if not isinstance(seed, Real) or seed % 1 != 0:
-        raise RefusedError(f"the seed {seed!r} is no whole number")
-    if not 0 <= seed <= LARGEST_SEED:
+    try:
+        whole = operator.index(seed)
+    except TypeError as error:
+        raise RefusedError(f"the seed {seed!r} is not a whole number, as 1 and 12345 are") from error
+    if not 0 <= whole <= LARGEST_SEED:
         raise RefusedError(f"the seed {seed} is not from 0 to 2^64 - 1 ({LARGEST_SEED})")
-    return int(seed)
+    return whole
 
 
 def words(seed: int, stream: int, purpose: int, first: int, count: int) -> NDArray[np.uint64]:

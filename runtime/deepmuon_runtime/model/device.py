@@ -10,10 +10,10 @@ from importlib.metadata import PackageNotFoundError, distribution
 
 import onnxruntime
 
-from deepmuon_runtime.errors import RefusedError, first_line
+from deepmuon_runtime.errors import FailedError, RefusedError, first_line
 from deepmuon_runtime.model.look_ups import with_gather
 
-__all__ = ["DEVICES", "open_session"]
+__all__ = ["DEVICES", "load_session", "open_session"]
 
 DEVICES = ("auto", "cpu", "cuda")
 
@@ -73,8 +73,18 @@ def open_session(content: bytes, name: str, device: str) -> tuple[onnxruntime.In
     return _load(content, name, CPU_PROVIDER), "cpu"
 
 
-def _load(content: bytes, name: str, provider: str) -> onnxruntime.InferenceSession:
-    options = onnxruntime.SessionOptions()
+def load_session(
+    content: bytes, name: str, options: onnxruntime.SessionOptions, provider: str = CPU_PROVIDER
+) -> onnxruntime.InferenceSession:
+    """Load a model by one of ONNX Runtime's providers, with options beside those that all sessions have.
+
+    Raises
+    ------
+    RefusedError
+        If the content is no ONNX model that ONNX Runtime can run.
+    FailedError
+        If the memory does not suffice.
+    """
     # One thread a run: several runs side by side are faster than one run on several threads.
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
@@ -84,7 +94,13 @@ def _load(content: bytes, name: str, provider: str) -> onnxruntime.InferenceSess
     try:
         return onnxruntime.InferenceSession(content, options, providers=settings, enable_fallback=0)
     except Exception as error:  # ONNX Runtime's own classes have no common base
+        if isinstance(error, MemoryError) or "bad_alloc" in str(error) or "bad allocation" in str(error):
+            raise FailedError(f"memory ran out when {name} was loaded") from error
         raise RefusedError(f"{name} is no ONNX model that can be run: {first_line(error)}") from error
+
+
+def _load(content: bytes, name: str, provider: str) -> onnxruntime.InferenceSession:
+    return load_session(content, name, onnxruntime.SessionOptions(), provider)
 
 
 def _load_on_cuda(content: bytes, name: str) -> onnxruntime.InferenceSession | None:

@@ -12,8 +12,10 @@ from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.latents.philox import LARGEST_SEED
 from deepmuon_runtime.latents.shard import Shard
 from deepmuon_runtime.model.metadata import Model, is_name
+from deepmuon_runtime.muon_file.checksum import attributes_crc32, unlike
+from deepmuon_runtime.muon_file.format import ATTRIBUTES_CHECKSUM
 
-__all__ = ["attribute_defects", "is_generated", "sound_attributes"]
+__all__ = ["ALWAYS", "attribute_defects", "checksum_defects", "is_generated", "sound_attributes", "value_defects"]
 
 ROUNDING = 1e-9  # relative, of a live time
 
@@ -52,6 +54,10 @@ TEXTS = _Rule(lambda x: isinstance(x, list) and all(isinstance(line, str) for li
 WHOLE = _Rule(_is_whole, "a whole number from 0 on")
 NOT_NEGATIVE = _Rule(lambda x: _is_number(x) and x >= 0, "a finite number from 0 on")
 POSITIVE = _Rule(lambda x: _is_number(x) and x > 0, "a finite number above 0")
+ZENITH = _Rule(lambda x: _is_number(x) and 0 <= x <= 90, "a number of degrees from 0 to 90")
+SIZES = _Rule(
+    lambda x: isinstance(x, list) and x != [] and all(map(POSITIVE.is_good, x)), "a list of finite numbers above 0"
+)
 
 ALWAYS = {
     "count": WHOLE,
@@ -68,19 +74,33 @@ GENERATED = {
     "model_sha256": _Rule(lambda x: isinstance(x, str) and bool(re.fullmatch("[0-9a-f]{64}", x)), "64 hex digits"),
     "architecture": NAME,
     "device": _Rule(lambda x: isinstance(x, str) and x in ("cpu", "cuda"), '"cpu" or "cuda"'),
-    "command_line": TEXT,
 }
 CONVERTED = {"source": TEXT, "provenance": TEXTS}
 WHERE_KNOWN = {
     "smoothed": _Rule(lambda x: isinstance(x, bool), "true or false"),
-    "rate_hz_per_m2": POSITIVE,
+    "command_line": TEXT,
+    "rate_hz_per_m2": NOT_NEGATIVE,
     "rate_uncertainty_hz_per_m2": NOT_NEGATIVE,
     "variance_factor": POSITIVE,
-    "flux": NAME,
     "live_time_s_m2": NOT_NEGATIVE,
     "live_time_s": POSITIVE,
     "area_m2": POSITIVE,
+    "flux": NAME,
+    "surface": _Rule(lambda x: _is_whole(x) and x <= 1, "0 (a horizontal plane) or 1 (a sphere)"),
+    "energy_min_gev": NOT_NEGATIVE,
+    "energy_max_gev": POSITIVE,
+    "zenith_min_degrees": ZENITH,
+    "zenith_max_degrees": ZENITH,
+    "fraction_kept": _Rule(lambda x: _is_number(x) and 0 < x <= 1, "a number above 0 and at most 1"),
+    "target": TEXT,
+    "target_size_m": SIZES,
+    "target_rate_hz": NOT_NEGATIVE,
+    "target_rate_uncertainty_hz": NOT_NEGATIVE,
+    "target_live_time_s": NOT_NEGATIVE,
 }
+LIVE_TIMES = {"live_time_s_m2": "rate_hz_per_m2", "target_live_time_s": "target_rate_hz"}
+"""What the number of muons in a file makes of each rate above 0: count / rate."""
+
 RULES = {**ALWAYS, **GENERATED, **CONVERTED, **WHERE_KNOWN}
 
 
@@ -92,6 +112,41 @@ def is_generated(attributes: Mapping[str, Any]) -> bool:
 def sound_attributes(attributes: Mapping[str, Any]) -> dict[str, Any]:
     """Return the attributes of the format whose values are what they can be."""
     return {name: value for name, value in attributes.items() if name in RULES and RULES[name].is_good(value)}
+
+
+def checksum_defects(attributes: Mapping[str, Any], version: int) -> Iterator[str]:
+    """Yield what the checksum says against the attributes of `/muons`.
+
+    Parameters
+    ----------
+    attributes
+        All of them, as `format.stated` gives them, their checksum among them.
+    version
+        The format version of the file; version 1 had no checksum of attributes.
+    """
+    others = {name: value for name, value in attributes.items() if name != ATTRIBUTES_CHECKSUM}
+    expected = attributes.get(ATTRIBUTES_CHECKSUM)
+    if expected is None:
+        if version > 1:
+            yield f"the attribute {ATTRIBUTES_CHECKSUM} is missing"
+        return
+    try:
+        found = attributes_crc32(others)
+    except ValueError as error:
+        yield str(error)
+        return
+    if not isinstance(expected, int):
+        yield f"the attribute {ATTRIBUTES_CHECKSUM} is {_shown(expected)}, and should be a number, their CRC-32"
+    elif found != expected:
+        yield f"what the attributes say {unlike(found, expected)}"
+
+
+def value_defects(attributes: Mapping[str, Any]) -> Iterator[str]:
+    """Yield which of the format's attributes have values that they can't have."""
+    sound = sound_attributes(attributes)
+    for name, value in attributes.items():
+        if name in RULES and name not in sound:
+            yield f"the attribute {name} is {_shown(value)}, and should be {RULES[name].meaning}"
 
 
 def attribute_defects(attributes: Mapping[str, Any], model: Model | None) -> Iterator[str]:
@@ -106,12 +161,11 @@ def attribute_defects(attributes: Mapping[str, Any], model: Model | None) -> Ite
     """
     required = {**ALWAYS, **(GENERATED if is_generated(attributes) else CONVERTED)}
     yield from (f"the attribute {name} is missing" for name in required if name not in attributes)
+    yield from value_defects(attributes)
     sound = sound_attributes(attributes)
-    for name, value in attributes.items():
-        if name in RULES and name not in sound:
-            yield f"the attribute {name} is {_shown(value)}, and should be {RULES[name].meaning}"
     yield from _shard_defects(sound)
     yield from _live_time_defects(sound)
+    yield from _choice_defects(sound)
     if model is not None:
         yield from _model_defects(sound, model)
 
@@ -129,14 +183,27 @@ def _shard_defects(sound: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _live_time_defects(sound: Mapping[str, Any]) -> Iterator[str]:
-    if ("live_time_s" in sound) != ("area_m2" in sound):
-        yield "live_time_s and area_m2 go together, and only one is there"
-    if ("rate_hz_per_m2" in sound) != ("live_time_s_m2" in sound):
-        yield "rate_hz_per_m2 and live_time_s_m2 go together, and only one is there"
-    elif {"rate_hz_per_m2", "live_time_s_m2", "count"} <= sound.keys():
-        expected, found = sound["count"] / sound["rate_hz_per_m2"], sound["live_time_s_m2"]
-        if not math.isclose(found, expected, rel_tol=ROUNDING):
-            yield f"the attribute live_time_s_m2 is {found!r}, and count / rate_hz_per_m2 is {expected!r}"
+    if "live_time_s" in sound and sound.keys().isdisjoint({"area_m2", "target"}):
+        yield "live_time_s goes with area_m2 or target, and none of them is there"
+    if "area_m2" in sound and "live_time_s" not in sound:
+        yield "area_m2 goes with live_time_s, which is not there"
+    for live_time, rate in LIVE_TIMES.items():
+        if (sound.get(rate, 0) > 0) != (live_time in sound):
+            yield f"{rate} and {live_time} go together, and only one is there"
+        elif {rate, live_time, "count"} <= sound.keys():
+            expected, found = sound["count"] / sound[rate], sound[live_time]
+            if not math.isclose(found, expected, rel_tol=ROUNDING):
+                yield f"the attribute {live_time} is {found!r}, and count / {rate} is {expected!r}"
+        elif sound.get(rate) == 0 and sound.get("count"):
+            yield f"the attribute {rate} is 0, and count is {sound['count']}"
+
+
+def _choice_defects(sound: Mapping[str, Any]) -> Iterator[str]:
+    for low, high in (("energy_min_gev", "energy_max_gev"), ("zenith_min_degrees", "zenith_max_degrees")):
+        if {low, high} <= sound.keys() and sound[low] >= sound[high]:
+            yield f"{low} is {sound[low]!r}, and should be below {high}, which is {sound[high]!r}"
+    if "target_size_m" in sound and "target" not in sound:
+        yield "target_size_m goes with target, which is not there"
 
 
 def _model_defects(sound: Mapping[str, Any], model: Model) -> Iterator[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 from zlib import crc32
@@ -11,16 +12,25 @@ from zlib import crc32
 import h5py
 import numpy as np
 
-from deepmuon_runtime.errors import RefusedError, reason
+from deepmuon_runtime.errors import reason
 from deepmuon_runtime.model.metadata import Model
 from deepmuon_runtime.model.released import list_models
-from deepmuon_runtime.muon_file.attributes import attribute_defects, is_generated, sound_attributes
+from deepmuon_runtime.muon_file.attributes import attribute_defects, checksum_defects, is_generated, sound_attributes
 from deepmuon_runtime.muon_file.checksum import unlike
+from deepmuon_runtime.muon_file.columns import (
+    columns_of,
+    missing_columns,
+    statement_defects,
+    storage_defects,
+    type_defects,
+)
 from deepmuon_runtime.muon_file.damage import READ_ERRORS, member
-from deepmuon_runtime.muon_file.format import CHECKSUM, COLUMNS, check_format, python_value
+from deepmuon_runtime.muon_file.format import CHECKSUM, COLUMNS, check_format, stated
+from deepmuon_runtime.muon_file.place_and_time import PlacesAndTimes
+from deepmuon_runtime.muon_file.reader import opened_file
 from deepmuon_runtime.muon_file.virtual import VirtualColumn, opened_source
 from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
-from deepmuon_runtime.physical import POSITIVE_ENERGIES, Fault, describe, explain, find_unphysical
+from deepmuon_runtime.physical import POSITIVE_ENERGIES, describe, explain, find_unphysical
 
 __all__ = ["Report", "check_file"]
 
@@ -85,7 +95,7 @@ def check_file(path: str | Path, progress: Callable[[int], object] = lambda _: N
     Parameters
     ----------
     path
-        A muon file, format version 1.
+        A muon file, of any format version.
     progress
         Called again and again with the number of muons read since the last call.
 
@@ -94,29 +104,28 @@ def check_file(path: str | Path, progress: Callable[[int], object] = lambda _: N
     RefusedError
         If the file can't be opened, or is no muon file of this version.
     """
-    if Path(path).exists() and not Path(path).is_file():  # a pipe would be waited for
-        raise RefusedError(f"{path} is no file")
-    try:
-        with h5py.File(path, "r") as file:
-            check_format(file, path)
-            return _report(file, progress)
-    except READ_ERRORS as error:
-        raise RefusedError(f"{path} can't be read as a muon file: {reason(error)}") from error
+    with opened_file(path) as file:
+        return _report(file, check_format(file, path), progress)
 
 
-def _report(file: h5py.File, progress: Callable[[int], object]) -> Report:
+def _report(file: h5py.File, version: int, progress: Callable[[int], object]) -> Report:
     report = Report()
     group = member(file, "muons")
     if not isinstance(group, h5py.Group):
         report.defects.append("there is no group /muons")
         return report
     attributes = _read_attributes(group, "/muons", report.defects)
+    if attributes:
+        report.defects += checksum_defects(attributes, version)
     if is_generated(attributes):
         report.model = _released_model(attributes.get("model_sha256"))
     report.attributes = sound_attributes(attributes)
     report.defects += attribute_defects(attributes, report.model)
-    columns = _sound_columns(group, report.attributes.get("count"), report.defects, progress)
-    if len(columns) == len(COLUMNS) and len({len(column) for column in columns.values()}) == 1:
+    there = columns_of(group, version)
+    missing = list(missing_columns(group, there, version))
+    report.defects += (f"the column {name} is missing" for name in missing)
+    columns = _sound_columns(there, report.attributes.get("count"), report.defects, progress)
+    if not missing and columns.keys() == there.keys() and len({len(column) for column in columns.values()}) == 1:
         _examine_muons(columns, report, progress)
     else:
         report.defects.append("the muons were not examined, because the columns are not sound")
@@ -125,7 +134,7 @@ def _report(file: h5py.File, progress: Callable[[int], object]) -> Report:
 
 def _read_attributes(node: h5py.HLObject, name: str, defects: list[str]) -> dict[str, Any]:
     try:
-        return {key: python_value(value) for key, value in node.attrs.items()}
+        return stated(node)
     except READ_ERRORS as error:
         defects.append(f"the attributes of {name} can't be read: {reason(error)}")
         return {}
@@ -136,57 +145,42 @@ def _released_model(sha256: object) -> Model | None:
 
 
 def _sound_columns(
-    group: h5py.Group, count: int | None, defects: list[str], progress: Callable[[int], object]
+    there: dict[str, h5py.Dataset], count: int | None, defects: list[str], progress: Callable[[int], object]
 ) -> dict[str, _Column]:
     """Return the columns that can be read as the format's, and note the defects of all."""
     sound = {}
-    for name, (_, units) in COLUMNS.items():
-        column = member(group, name)
-        if not isinstance(column, h5py.Dataset):
-            defects.append(f"the column {name} is missing")
-            continue
+    for name, column in there.items():
         try:
             found = list(_column_defects(column, name, progress))
+            if not found:
+                stored = VirtualColumn(column, name, progress) if column.is_virtual else column
         except READ_ERRORS as error:
             found = [f"can't be read: {reason(error)}"]
         attributes = _read_attributes(column, name, defects)
-        checksum = attributes.get(CHECKSUM)
         if not found:
-            sound[name] = _Column(VirtualColumn(column, progress) if column.is_virtual else column, checksum)
-        if not found and count is not None and len(column) != count:
-            found = [f"has {len(column)} muons, and the attribute count is {count}"]
-        if attributes.get("units") != units:
-            found.append(f"has the units {attributes.get('units')!r}, and should have {units!r}")
-        if not isinstance(checksum, int):
-            found.append(f"has the checksum {checksum!r}, and should have a number, its CRC-32")
+            sound[name] = _Column(stored, attributes.get(CHECKSUM))
+        found += statement_defects(column, attributes, name, None if found else count)
         defects += (f"the column {name} {defect}" for defect in found)
     return sound
 
 
 def _column_defects(column: h5py.Dataset, name: str, progress: Callable[[int], object]) -> Iterator[str]:
     """Yield what keeps a column from being read."""
-    dtype = COLUMNS[name][0]
-    if column.dtype != dtype or column.ndim != 1:
-        yield f"is {column.dtype} of shape {column.shape}, and should be {dtype} of one dimension"
-    elif column.is_virtual:
-        yield from _source_defects(VirtualColumn(column), name, progress)
-    elif column.external:
-        yield "keeps its numbers in a file that is not HDF5"
-    elif column.chunks is None:
-        if column.id.get_storage_size() != column.nbytes:
-            yield f"holds {column.id.get_storage_size()} of its {column.nbytes} bytes"
-    elif column.id.get_num_chunks() != -(-len(column) // column.chunks[0]):
-        yield f"holds {column.id.get_num_chunks()} of its {-(-len(column) // column.chunks[0])} chunks"
+    wrong_type = list(type_defects(column, name))
+    if wrong_type or not column.is_virtual:
+        yield from wrong_type or storage_defects(column)
+    else:
+        yield from _source_defects(VirtualColumn(column, name), progress)
 
 
-def _source_defects(column: VirtualColumn, name: str, progress: Callable[[int], object]) -> Iterator[str]:
+def _source_defects(column: VirtualColumn, progress: Callable[[int], object]) -> Iterator[str]:
     """Yield the first of the sources that can't be read, and how many others can't."""
     defects = []
     for source in column.sources:
         progress(0)
         try:
-            with opened_source(source) as stored:
-                defects += [f"its source {source.path} {defect}" for defect in _column_defects(stored, name, progress)]
+            with opened_source(source):
+                pass
         except OSError as error:
             defects.append(reason(error))
     if defects:
@@ -215,27 +209,28 @@ def _examine_muons(columns: dict[str, _Column], report: Report, progress: Callab
     """Read all muons and note, for each fault, the first that has it and how many have."""
     model = report.model
     energies = POSITIVE_ENERGIES if model is None else (model.energy_min_gev, model.energy_max_gev)
-    faults: dict[Fault, _Faulty] = {}
+    faults: dict[str, _Faulty] = {}
+    places_and_times = PlacesAndTimes(report.attributes.get("live_time_s"))
     total = len(columns["pdg_id"])
     for first in range(0, total, PIECE):
         span = slice(first, min(first + PIECE, total))
         try:
-            muons = Muons(**{name: column.read(span) for name, column in columns.items()})
+            values = {name: column.read(span) for name, column in columns.items()}
         except READ_ERRORS as error:
             report.defects.append(f"the muons from {first} on can't be read: {reason(error)}")
             break
+        muons = Muons(**{name: values[name] for name in COLUMNS})
         report.add(muons)
-        for fault, bad in find_unphysical(muons, *energies).items():
-            index = int(np.argmax(bad))
-            known = faults.setdefault(fault, _Faulty(first + index, describe(muons, index)))
-            known.count += int(np.count_nonzero(bad))
+        unphysical = ((explain(fault, *energies), bad) for fault, bad in find_unphysical(muons, *energies).items())
+        for fault, bad in chain(unphysical, places_and_times.faults(values)):
+            if bad.any():
+                index = int(np.argmax(bad))
+                known = faults.setdefault(fault, _Faulty(first + index, describe(muons, index)))
+                known.count += int(np.count_nonzero(bad))
         progress(len(muons))
     else:
         report.defects += _checksum_defects(columns)
-    report.defects += (
-        f"muon {known.first} {explain(fault, *energies)} ({known.muon}){known.others}"
-        for fault, known in faults.items()
-    )
+    report.defects += (f"muon {known.first} {fault} ({known.muon}){known.others}" for fault, known in faults.items())
 
 
 def _checksum_defects(columns: dict[str, _Column]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""What a damaged HDF5 file does to those who read it."""
+"""What a damaged or hostile HDF5 file does to those who read it."""
 
 from __future__ import annotations
 
@@ -11,11 +11,14 @@ READ_ERRORS = (OSError, RuntimeError, KeyError, ValueError, TypeError, Attribute
 
 
 def member(group: h5py.Group, path: str) -> h5py.Group | h5py.Dataset | None:
-    """Return what a group holds in the same file under a path, or None: a link to another file is not followed."""
+    """Return what a group itself holds under a path, or None.
+
+    Only hard links are followed: an external link leads to another file, and a soft one may lead to an external one.
+    """
     found = group
     try:
         for name in path.split("/"):
-            if not isinstance(found, h5py.Group) or isinstance(found.get(name, getlink=True), h5py.ExternalLink):
+            if not isinstance(found, h5py.Group) or not isinstance(found.get(name, getlink=True), h5py.HardLink):
                 return None
             found = found.get(name)
     except READ_ERRORS:

@@ -5,24 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
-from zlib import crc32
 
 import numpy as np
 
 from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.files.output import check_output
 from deepmuon_runtime.latents.shard import WHOLE_RUN
-from deepmuon_runtime.muon_file.checksum import unlike
-from deepmuon_runtime.muon_file.format import COLUMNS
-from deepmuon_runtime.muon_file.reader import read_attributes, read_checksums, read_pieces
+from deepmuon_runtime.muon_file.attributes import LIVE_TIMES
+from deepmuon_runtime.muon_file.format import COLUMNS, bytes_per_muon
+from deepmuon_runtime.muon_file.output import check_muon_output
+from deepmuon_runtime.muon_file.reader import opened, verify_muons
 from deepmuon_runtime.muon_file.writer import MuonWriter
+from deepmuon_runtime.room import check_disk
 
 __all__ = ["merge_shards"]
 
 PIECE = 1 << 17  # muons copied at once
 
 NEEDED = ("seed", "first", "total", "model_sha256")
-OF_ONE_SHARD = ("count", "first", "shard", "live_time_s_m2", "created", "created_by", "command_line")
+OF_ONE_SHARD = ("count", "first", "shard", *LIVE_TIMES, "created", "created_by", "command_line")
 
 
 class _Part(NamedTuple):
@@ -32,6 +32,7 @@ class _Part(NamedTuple):
     end: int
     path: Path
     attributes: dict[str, Any]
+    columns: tuple[str, ...]
 
 
 def merge_shards(
@@ -54,9 +55,10 @@ def merge_shards(
     output, overwrite
         As for `MuonWriter`.
     virtual
-        Whether the shards keep the muons, and the file only refers to them, by paths relative to its folder.
+        Whether the shards keep the muons, and the file only refers to them, by paths relative to its folder. They are
+        read all the same, once: damaged ones are refused.
     progress
-        Called again and again with the number of muons copied since the last call.
+        Called again and again with the number of muons read since the last call.
 
     Returns
     -------
@@ -79,14 +81,20 @@ def merge_shards(
     parts.sort(key=lambda part: (part.first, part.end))
     for part in parts[1:]:
         _check_same_run(parts[0], part)
-    check_output(output, overwrite, [part.path for part in parts])  # a virtual file would look for muons in itself
+    check_muon_output(output, overwrite, [part.path for part in parts])  # a virtual file would look for muons in itself
     total = parts[0].attributes["total"]
     _check_complete(parts, total)
-    described = {name: value for name, value in parts[0].attributes.items() if name != "live_time_s_m2"}
+    described = {name: value for name, value in parts[0].attributes.items() if name not in LIVE_TIMES}
     described |= {"shard": str(WHOLE_RUN), "first": 0, "seed": np.uint64(described["seed"])}
-    with MuonWriter(output, described, overwrite) as writer:
+    columns = parts[0].columns
+    folder = check_muon_output(output, overwrite).parent
+    if not virtual:
+        check_disk(folder, total * bytes_per_muon(columns), f"{total:,} muons")
+    with MuonWriter(output, described, overwrite, optional=set(columns) - set(COLUMNS)) as writer:
         if virtual:
             writer.refer([part.path for part in parts], progress)
+            for part in parts:
+                verify_muons(part.path, progress)
         else:
             for part in parts:
                 _copy(part, writer, progress)
@@ -95,28 +103,27 @@ def merge_shards(
 
 def _copy(part: _Part, writer: MuonWriter, progress: Callable[[int], object]) -> None:
     """Copy the muons of a shard, unless they are not those that were written to it."""
-    found = dict.fromkeys(COLUMNS, 0)
-    for muons in read_pieces(part.path, PIECE):
-        found = {name: crc32(getattr(muons, name).data, so_far) for name, so_far in found.items()}
-        writer.append(muons)
-        progress(len(muons))
-    for name, expected in read_checksums(part.path).items():
-        if found[name] != expected:
-            raise RefusedError(f"{part.path} is damaged: the column {name} {unlike(found[name], expected)}")
+    with opened(part.path) as file:
+        for columns in file.pieces(PIECE, part.columns):
+            writer.append_columns(columns)
+            progress(len(columns["pdg_id"]))
 
 
 def _part(path: Path) -> _Part:
-    attributes = read_attributes(path)
+    with opened(path) as file:
+        attributes, columns = file.attributes, tuple(file.columns)
     missing = [name for name in NEEDED if name not in attributes]
     if missing:
         raise RefusedError(f"{path} is no shard of a run: it lacks the attribute {missing[0]}")
-    for name in ("count", "first", "total", "seed"):
-        if not isinstance(attributes[name], int):
-            raise RefusedError(f"{path} is no shard of a run: its {name} is {attributes[name]!r}")
-    return _Part(attributes["first"], attributes["first"] + attributes["count"], path, attributes)
+    return _Part(attributes["first"], attributes["first"] + attributes["count"], path, attributes, columns)
 
 
 def _check_same_run(part: _Part, other: _Part) -> None:
+    if part.columns != other.columns:
+        raise RefusedError(
+            f"{part.path} and {other.path} are of different runs: their columns are {', '.join(part.columns)} and "
+            f"{', '.join(other.columns)}"
+        )
     names = (part.attributes.keys() | other.attributes.keys()) - set(OF_ONE_SHARD)
     for name in sorted(names):
         one, two = part.attributes.get(name), other.attributes.get(name)

@@ -1,7 +1,8 @@
 """Virtual columns: HDF5 datasets whose numbers lie in other files, one part after the other.
 
 Where a part's file is missing HDF5 reads the fill value, without an error: NaN, and 0 for the particle. It looks for it
-in several folders, and keeps every file open that it has read from. So the numbers are read from the files here.
+in several folders, and keeps every file open that it has read from. So the numbers are read from the files here, and
+from muon files alone, as a merge names them: a stranger's file can't have those of others read.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,8 +18,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from deepmuon_runtime.errors import reason
+from deepmuon_runtime.errors import RefusedError, reason
+from deepmuon_runtime.muon_file.columns import storage_defects, type_defects
 from deepmuon_runtime.muon_file.damage import READ_ERRORS, member
+from deepmuon_runtime.muon_file.format import check_format
 
 __all__ = ["Source", "VirtualColumn", "create_virtual_column", "opened_source"]
 
@@ -29,14 +33,14 @@ class Source(NamedTuple):
     ----------
     path
         The file.
-    dataset
-        The name of the column there.
+    column
+        The name of the column, here and there.
     first, end
         Which muons of the virtual column it holds; all of the file's.
     """
 
     path: Path
-    dataset: str
+    column: str
     first: int
     end: int
 
@@ -60,7 +64,7 @@ def create_virtual_column(
     for source in sources:
         file = str(source.path).replace("%", "%%")  # which HDF5 would replace by a number
         layout[source.first : source.end] = h5py.VirtualSource(
-            file, source.dataset, (source.end - source.first,), dtype
+            file, f"muons/{source.column}", (source.end - source.first,), dtype
         )
     return group.create_virtual_dataset(name, layout, fillvalue=np.nan if dtype.kind == "f" else 0)
 
@@ -72,6 +76,8 @@ class VirtualColumn:
     ----------
     column
         A virtual dataset of one dimension.
+    name
+        Of the column that it is.
     progress
         Called with 0 before each source is read.
 
@@ -83,14 +89,15 @@ class VirtualColumn:
     Raises
     ------
     ValueError
-        If it is not a row of whole columns of other files, in order and without gaps.
+        If it is not a row of whole columns of that name of other files, in order, without gaps, and named by paths
+        relative to the folder of its own.
     """
 
-    def __init__(self, column: h5py.Dataset, progress: Callable[[int], object] = lambda _: None) -> None:
+    def __init__(self, column: h5py.Dataset, name: str, progress: Callable[[int], object] = lambda _: None) -> None:
         self._progress = progress
         self._dtype = column.dtype
         self._length = len(column)
-        self.sources = sorted(_sources(column), key=lambda source: source.first)
+        self.sources = sorted(_sources(column, name), key=lambda source: source.first)
         edges = [0, *(source.end for source in self.sources)]
         if [source.first for source in self.sources] != edges[:-1] or edges[-1] != self._length:
             raise ValueError("its sources leave gaps or overlap")
@@ -118,13 +125,18 @@ class VirtualColumn:
         return values
 
 
-def _sources(column: h5py.Dataset) -> Iterator[Source]:
+def _sources(column: h5py.Dataset, name: str) -> Iterator[Source]:
     folder = Path(os.path.realpath(column.file.filename)).parent  # as HDF5 does, links followed
     for mapping in column.virtual_sources():
+        path = Path(mapping.file_name.replace("%%", "%"))
+        if path.is_absolute():
+            raise ValueError(f"its source {path} is not named by a path relative to the folder of the file")
+        if mapping.dset_name.strip("/") != f"muons/{name}":
+            raise ValueError(f"its source {path} is not the column {name} of a muon file")
         first, end = _row(mapping.vspace, len(column))
         if _row(mapping.src_space, end - first) != (0, end - first):
-            raise ValueError(f"a part of {mapping.file_name} is mapped, and not a whole column")
-        yield Source(folder / mapping.file_name.replace("%%", "%"), mapping.dset_name.strip("/"), first, end)
+            raise ValueError(f"a part of {path} is mapped, and not a whole column")
+        yield Source(folder / path, name, first, end)
 
 
 def _row(selection: h5py.h5s.SpaceID, length: int) -> tuple[int, int]:
@@ -144,11 +156,12 @@ def opened_source(source: Source) -> Iterator[h5py.Dataset]:
         raise OSError(f"its source {source.path} is missing")
     try:
         with h5py.File(source.path, "r") as file:
-            column = member(file, source.dataset)
+            check_format(file, "it")
+            column = member(file, f"muons/{source.column}")
             if not isinstance(column, h5py.Dataset) or column.shape != (source.end - source.first,):
                 raise ValueError(f"there is no column of {source.end - source.first} muons")
-            if column.is_virtual or column.external:
-                raise ValueError("the column keeps its numbers in other files")
+            for defect in chain(type_defects(column, source.column), storage_defects(column)):
+                raise ValueError(f"the column {defect}")
             yield column
-    except READ_ERRORS as error:
+    except (*READ_ERRORS, RefusedError) as error:
         raise OSError(f"its source {source.path} can't be read: {reason(error)}") from error

@@ -3,27 +3,40 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from datetime import datetime, timezone
 from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from zlib import crc32
 
 import h5py
 import numpy as np
+from numpy.typing import ArrayLike
 
 from deepmuon_runtime.errors import RefusedError, reason
 from deepmuon_runtime.files.early_flush import EarlyFlush
 from deepmuon_runtime.files.partial import PartialFile
 from deepmuon_runtime.files.quiet import QuietFile
-from deepmuon_runtime.muon_file.checksum import joined_crc32
-from deepmuon_runtime.muon_file.format import BYTES_PER_MUON, CHECKSUM, COLUMNS, FORMAT, FORMAT_VERSION
-from deepmuon_runtime.muon_file.reader import checksums_of, opened
-from deepmuon_runtime.muon_file.virtual import Source, create_virtual_column
+from deepmuon_runtime.muon_file.attributes import LIVE_TIMES, value_defects
+from deepmuon_runtime.muon_file.checksum import attributes_crc32, joined_crc32
+from deepmuon_runtime.muon_file.format import (
+    ATTRIBUTES_CHECKSUM,
+    CHECKSUM,
+    COLUMNS,
+    FORMAT,
+    FORMAT_VERSION,
+    OPTIONAL_COLUMNS,
+    bytes_per_muon,
+    python_value,
+    stated,
+)
+from deepmuon_runtime.muon_file.output import check_muon_output
+from deepmuon_runtime.muon_file.reader import opened
+from deepmuon_runtime.muon_file.virtual import Source, VirtualColumn, create_virtual_column
 from deepmuon_runtime.muons import Muons
 
 __all__ = ["MuonWriter", "write_muons"]
@@ -67,10 +80,12 @@ class MuonWriter:
         The file to be written; its folder must exist.
     attributes
         What the file says of its muons: `depth_m` and `medium` at least; strings, numbers, booleans, or lists
-        of strings. `count` and `created` are added, `created_by` unless given, and
-        `live_time_s_m2 = count / rate_hz_per_m2` where the rate is.
+        of them. `count` and `created` are added, `created_by` unless given, and where a rate is above 0 the live time
+        that it makes of the count (`live_time_s_m2 = count / rate_hz_per_m2`).
     overwrite
         Whether an existing file is replaced, at the moment when the new one is complete.
+    optional
+        Which of the optional columns (`format.OPTIONAL_COLUMNS`) the file has.
 
     Attributes
     ----------
@@ -82,7 +97,8 @@ class MuonWriter:
     Raises
     ------
     RefusedError
-        On construction and entry, if `path` can't be written, an attribute is missing, or SOURCE_DATE_EPOCH is no time.
+        On construction and entry, if `path` can't be written, an attribute is missing or can't be what it is, or
+        SOURCE_DATE_EPOCH is no time.
     FailedError
         Later, if writing fails (disk full), or another process has written `path` meanwhile.
     """
@@ -90,7 +106,15 @@ class MuonWriter:
     # HDF5 calls back into Python (QuietFile), and must not meet a KeyboardInterrupt there. Python handles
     # signals in the main thread only, so all calls of HDF5 are made by a thread of their own.
 
-    def __init__(self, path: str | Path, attributes: Mapping[str, object], overwrite: bool = False) -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        attributes: Mapping[str, object],
+        overwrite: bool = False,
+        *,
+        optional: Collection[str] = (),
+    ) -> None:
+        check_muon_output(path, overwrite)
         self._partial = PartialFile(path, overwrite)
         self.path = self._partial.target
         missing = [name for name in ("depth_m", "medium") if name not in attributes]
@@ -98,9 +122,12 @@ class MuonWriter:
             raise RefusedError(f"a muon file must say its {' and '.join(missing)}: add it to the attributes")
         self.count = 0
         self._created = _stated_time()
-        self._attributes = dict(attributes)
+        self._attributes = {name: _storable(value) for name, value in attributes.items()}
+        for defect in _defects(self._attributes):
+            raise RefusedError(f"{path} was not written: {defect}")
+        self._types = {**COLUMNS, **{name: OPTIONAL_COLUMNS[name] for name in OPTIONAL_COLUMNS if name in optional}}
         self._columns: dict[str, h5py.Dataset] = {}
-        self._checksums = dict.fromkeys(COLUMNS, 0)
+        self._checksums = dict.fromkeys(self._types, 0)
 
     def __enter__(self) -> MuonWriter:
         """Create the temporary file."""
@@ -116,15 +143,27 @@ class MuonWriter:
         return self
 
     def append(self, muons: Muons) -> None:
-        """Write muons after those already written.
+        """Write muons, to a file without optional columns, after those already written.
 
         Raises
         ------
         FailedError
             If they can't be written, for instance on a full disk.
         """
+        self.append_columns(vars(muons))
+
+    def append_columns(self, columns: Mapping[str, ArrayLike]) -> None:
+        """Write muons, as all columns of the file by their names, after those already written.
+
+        Raises
+        ------
+        FailedError
+            As for `append`.
+        """
+        if columns.keys() != self._types.keys():
+            raise ValueError(f"the columns are {', '.join(columns)}, and those of the file {', '.join(self._types)}")
         with self._partial.failures():
-            self._in_thread(self._append, muons)
+            self._in_thread(self._append, columns)
 
     def refer(self, paths: Iterable[str | Path], progress: Callable[[int], object] = lambda _: None) -> None:
         """Take all muons from other muon files, which keep them, instead of `append`.
@@ -156,6 +195,7 @@ class MuonWriter:
             if kind is None:
                 with self._partial.failures():
                     self._in_thread(self._finish)
+                    self._in_thread(self._close)  # an open file gets no other name on Windows
                     self._partial.publish()
         finally:
             self._discard()
@@ -170,23 +210,24 @@ class MuonWriter:
         # Whole chunks go straight to the file: a cache would only copy them once more.
         self._file = h5py.File(self._backing, "w", rdcc_nbytes=0)
 
-    def _append(self, muons: Muons) -> None:
+    def _append(self, columns: Mapping[str, ArrayLike]) -> None:
+        length = len(np.asarray(columns["pdg_id"]))
         if not self._columns:
-            self._create_columns(len(muons))
-        end = self.count + len(muons)
+            self._create_columns(length)
+        end = self.count + length
         for name, column in self._columns.items():
-            values = np.ascontiguousarray(getattr(muons, name), COLUMNS[name][0])
+            values = np.ascontiguousarray(columns[name], self._types[name][0])
             column.resize((end,))
             column[self.count : end] = values
             self._checksums[name] = crc32(values.data, self._checksums[name])
         self.count = end
         self._raise_fault()
-        self._flush.wrote(len(muons) * BYTES_PER_MUON)
+        self._flush.wrote(length * bytes_per_muon(self._types))
 
     def _create_columns(self, first_length: int) -> None:
         chunk = min(max(first_length, SMALLEST_CHUNK), LARGEST_CHUNK)
         group = self._file.create_group("muons")
-        for name, (dtype, _) in COLUMNS.items():
+        for name, (dtype, _) in self._types.items():
             self._columns[name] = group.create_dataset(name, shape=(0,), maxshape=(None,), chunks=(chunk,), dtype=dtype)
 
     def _refer(self, paths: Iterable[str | Path], progress: Callable[[int], object]) -> None:
@@ -200,11 +241,8 @@ class MuonWriter:
             return
         ends = np.cumsum([part.length for part in parts]).tolist()
         group = self._file.create_group("muons")
-        for name, (dtype, _) in COLUMNS.items():
-            sources = [
-                Source(part.path, f"muons/{name}", end - part.length, end)
-                for part, end in zip(parts, ends, strict=True)
-            ]
+        for name, (dtype, _) in self._types.items():
+            sources = [Source(part.path, name, end - part.length, end) for part, end in zip(parts, ends, strict=True)]
             progress(0)
             self._columns[name] = create_virtual_column(group, name, dtype, sources)
             self._checksums[name] = joined_crc32((part.checksums[name], part.length * dtype.itemsize) for part in parts)
@@ -212,37 +250,41 @@ class MuonWriter:
         self._raise_fault()
 
     def _part(self, path: str | Path) -> _Part:
-        with opened(path) as group:
-            if any(group[name].is_virtual for name in COLUMNS):
+        with opened(path) as file:
+            if file.columns.keys() != self._types.keys():
+                raise RefusedError(
+                    f"{path} has the columns {', '.join(file.columns)}, and not {', '.join(self._types)}"
+                )
+            if any(isinstance(column, VirtualColumn) for column in file.columns.values()):
                 raise RefusedError(f"{path} keeps its muons in other files: name those instead")
             relative = os.path.relpath(os.path.realpath(path), self.path.parent)
-            return _Part(Path(relative), len(group["pdg_id"]), checksums_of(group))
+            return _Part(Path(relative), len(file), file.checksums)
 
     def _finish(self) -> None:
         """Write the attributes, and all that is in memory to the disk."""
         if not self._columns:
             self._create_columns(0)
         for name, column in self._columns.items():
-            column.attrs["units"] = COLUMNS[name][1]
+            column.attrs["units"] = self._types[name][1]
             column.attrs[CHECKSUM] = np.uint32(self._checksums[name])
         self._file.attrs["format"] = FORMAT
         self._file.attrs["format_version"] = FORMAT_VERSION
+        group = self._file["muons"]
         for name, value in self._all_attributes().items():
-            if isinstance(value, (list, tuple)):
-                self._file["muons"].attrs.create(name, list(value), dtype=h5py.string_dtype())
-            else:
-                self._file["muons"].attrs[name] = value
+            is_texts = isinstance(value, list) and all(isinstance(item, str) for item in value)
+            group.attrs.create(name, value, dtype=h5py.string_dtype() if is_texts else None)
+        group.attrs[ATTRIBUTES_CHECKSUM] = np.uint32(attributes_crc32(stated(group)))
         self._file.close()
         self._raise_fault()
         self._flush.finish()
 
-    def _all_attributes(self) -> dict[str, object]:
+    def _all_attributes(self) -> dict[str, Any]:
         attributes = {"created_by": f"deepmuon-runtime {version('deepmuon-runtime')}", **self._attributes}
         attributes["count"] = self.count
         attributes["created"] = (self._created or datetime.now(timezone.utc)).isoformat(timespec="seconds")
-        rate = attributes.get("rate_hz_per_m2")
-        if isinstance(rate, (int, float, np.number)) and rate > 0:
-            attributes["live_time_s_m2"] = self.count / float(rate)
+        for live_time, rate in LIVE_TIMES.items():
+            if attributes.get(rate, 0) > 0:
+                attributes[live_time] = self.count / float(attributes[rate])
         return attributes
 
     def _raise_fault(self) -> None:
@@ -281,6 +323,25 @@ def write_muons(path: str | Path, muons: Muons, attributes: Mapping[str, object]
     """
     with MuonWriter(path, attributes, overwrite) as writer:
         writer.append(muons)
+
+
+def _storable(value: Any) -> Any:
+    """Return an attribute with what HDF5 can't hold in a text escaped: the byte 0, and what is no UTF-8."""
+    if isinstance(value, (list, tuple)):
+        return [_storable(item) for item in value]
+    if isinstance(value, str):
+        return value.replace("\0", r"\x00").encode("utf-8", "backslashreplace").decode()
+    return value
+
+
+def _defects(attributes: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what keeps attributes from being written: no reader would take them."""
+    attributes = {name: python_value(value) for name, value in attributes.items()}
+    try:
+        attributes_crc32(attributes)
+    except ValueError as error:
+        yield str(error)
+    yield from value_defects(attributes)
 
 
 class _Part(NamedTuple):

@@ -57,14 +57,14 @@ def count_spectra(path: str | Path, *, progress: Callable[[int], object] | None 
     Parameters
     ----------
     path
-        A muon file, format version 1. The memory needed does not grow with its size.
+        A muon file. The memory needed does not grow with its size.
     progress
         Called after each piece with the number of muons read since the last call.
 
     Raises
     ------
     RefusedError
-        If it can't be read, is no muon file, or holds no muon.
+        If it can't be read, is no muon file or a damaged one, or holds no muon.
     """
     attributes = read_attributes(path)
     count = int(attributes["count"])

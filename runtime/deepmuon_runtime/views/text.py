@@ -15,12 +15,15 @@ from deepmuon_runtime.muon_file.format import FORMAT
 from deepmuon_runtime.muon_file.reader import read_attributes, read_pieces
 from deepmuon_runtime.muons import Muons
 
-__all__ = ["UNITS", "csv_pieces", "phits_pieces"]
+__all__ = ["SHORTEST_LINE", "UNITS", "csv_pieces", "phits_pieces"]
 
 UNITS = {"GeV": 1.0, "MeV": 1e3}
 """Each unit of energy in a GeV."""
 
 PIECE = 1 << 15  # muons turned into text at once
+
+SHORTEST_LINE = len("1,0,0,-1,13\n")
+"""Bytes that a muon takes at least."""
 
 LINE = "%.9g,%.9g,%.9g,%.9g,%d\n"  # nine digits tell any two float32 numbers apart
 
@@ -34,7 +37,7 @@ def csv_pieces(path: str | Path, *, unit: str = "GeV", header: bool = True) -> I
     Parameters
     ----------
     path
-        A muon file, format version 1. The memory needed does not grow with its size.
+        A muon file. The memory needed does not grow with its size.
     unit
         Unit of the energy, one of `UNITS`.
     header
@@ -43,7 +46,8 @@ def csv_pieces(path: str | Path, *, unit: str = "GeV", header: bool = True) -> I
     Raises
     ------
     RefusedError
-        If the file can't be read or is no muon file, or there is no such unit.
+        If the file can't be read or is no muon file, or there is no such unit; after the last piece, if its muons are
+        not what was written: text that is shown to somebody before the end is not verified.
     """
     if unit not in UNITS:
         raise RefusedError(f"there is no unit {unit!r}: energies are in {' or '.join(UNITS)}")

@@ -204,9 +204,11 @@ def test_a_signal_after_the_commands_process_has_ended_is_late():
         wait = os.waitpid
         def wait_and_interrupt(*arguments):
             done = wait(*arguments)
-            signal.raise_signal(signal.SIGINT)
+            if os.getpid() == here:
+                signal.raise_signal(signal.SIGINT)
             return done
 
+        here = os.getpid()
         os.waitpid = wait_and_interrupt
         isolation.run_isolated(command, "it")
     """

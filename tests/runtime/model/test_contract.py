@@ -45,8 +45,8 @@ def test_a_model_that_lacks_a_key_is_refused(tmp_path, key):
 @pytest.mark.parametrize(
     ("key", "value", "meaning"),
     [
-        ("contract_version", "2", "1 for this release"),
-        ("contract_version", "one", "1 for this release"),
+        ("contract_version", "3", "1 or 2 for this release"),
+        ("contract_version", "one", "1 or 2 for this release"),
         ("created_by", "", "a text"),
         ("architecture", "", "a name"),
         ("architecture", "q\x1b[2J", "a name"),

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.muon_files import sign_attributes
 
 from deepmuon_runtime import (
     FailedError,
@@ -29,7 +30,7 @@ from deepmuon_runtime import (
 from deepmuon_runtime.files.output import check_output
 from deepmuon_runtime.files.partial import PARTIAL_SUFFIX
 from deepmuon_runtime.files.quiet import QuietFile
-from deepmuon_runtime.muon_file.reader import read_checksums, read_pieces
+from deepmuon_runtime.muon_file.reader import opened, read_pieces
 from deepmuon_runtime.muon_file.virtual import VirtualColumn
 
 PLANE = {"depth_m": 10.0, "medium": "G4_WATER"}
@@ -64,7 +65,7 @@ def test_what_was_written_in_pieces_is_read_back_in_any_part(tmp_path_factory, p
 def test_the_file_is_what_the_format_says(tmp_path):
     write_muons(tmp_path / "muons.h5", some_muons(5), PLANE)
     with h5py.File(tmp_path / "muons.h5") as file:
-        assert dict(file.attrs) == {"format": "deepmuon-muons", "format_version": 1}
+        assert dict(file.attrs) == {"format": "deepmuon-muons", "format_version": 2}
         assert set(file) == {"muons"}
         assert set(file["muons"]) == set(COLUMNS)
         for name in COLUMNS:
@@ -140,6 +141,40 @@ def test_overwriting_replaces_the_file_at_the_end_and_not_before(tmp_path):
         writer.append(some_muons(4))
         assert len(read_muons(path)) == 3
     assert len(read_muons(path)) == 4
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o666])
+def test_a_file_that_is_replaced_keeps_its_mode(tmp_path, mode):
+    path = tmp_path / "muons.h5"
+    write_muons(path, some_muons(3), PLANE)
+    path.chmod(mode)
+    write_muons(path, some_muons(4), PLANE, overwrite=True)
+    assert (len(read_muons(path)), stat.S_IMODE(path.stat().st_mode)) == (4, mode)
+
+
+@pytest.mark.parametrize(
+    ("name", "advice"),
+    [
+        ("muons.csv", "write muons.h5, and then deepmuon-csv muons.h5 -o muons.csv"),
+        ("muons.CSV", "write muons.h5, and then deepmuon-csv muons.h5 -o muons.CSV"),
+        ("muons.root", "write muons.h5, and then read it in Python with deepmuon_runtime.read_muons"),
+        ("muons.parquet", "write muons.h5, and then read it in Python"),
+        ("muons.mcpl", "write muons.h5, and then read it in Python"),
+        ("muons.mcpl.gz", "write muons.mcpl.h5, and then compress that"),
+        ("muons.png", "deepmuon-plot muons.h5 -o muons.png"),
+    ],
+)
+def test_a_name_that_promises_another_format_is_refused_with_the_way_to_it(tmp_path, name, advice):
+    with pytest.raises(RefusedError, match="would be HDF5 under a name of ") as refusal:
+        write_muons(tmp_path / name, some_muons(1), PLANE)
+    assert advice in str(refusal.value)
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["muons", "muons.h5", "muons.hdf5", "water-0.5", "csv"])
+def test_any_other_name_is_good(tmp_path, name):
+    write_muons(tmp_path / name, some_muons(1), PLANE)
+    assert len(read_muons(tmp_path / name)) == 1
 
 
 @pytest.fixture(params=[None, errno.EPERM], ids=["hard links", "no hard links"])
@@ -312,6 +347,7 @@ def test_a_link_is_followed(tmp_path):
         ("", "is a folder"),
         ("folder", "is a folder"),
         ("pipe", "is a device or a pipe"),
+        ("loop", "is a symbolic link that leads back to itself"),
         ("missing/muons.h5", "there is no folder"),
         ("file/muons.h5", "there is no folder"),
         ("a\0b", "can't be written"),
@@ -322,6 +358,8 @@ def test_a_path_that_can_not_be_a_file_is_refused(tmp_path, name, reason):
     (tmp_path / "folder").mkdir()
     (tmp_path / "file").touch()
     os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "loop").symlink_to("pool")
+    (tmp_path / "pool").symlink_to("loop")
     path = f"{tmp_path}/{name}"
     before = set(tmp_path.rglob("*"))
     with pytest.raises(RefusedError, match=reason):
@@ -347,7 +385,7 @@ def spoil(path: Path, how: str) -> None:
         if how == "no format":
             del file.attrs["format"]
         elif how == "later version":
-            file.attrs["format_version"] = 2
+            file.attrs["format_version"] = 3
         elif how == "no group":
             del file["muons"]
         elif how == "no count":
@@ -366,6 +404,8 @@ def spoil(path: Path, how: str) -> None:
         elif how == "other type":
             del muons["u"]
             muons["u"] = np.zeros(10)
+        if how != "no group":
+            sign_attributes(muons)
 
 
 @pytest.mark.parametrize(
@@ -472,12 +512,17 @@ def test_living_writers_and_those_of_other_files_are_passed_over(tmp_path):
     assert living.returncode == 0
 
 
+def checksums(path: Path) -> dict[str, int]:
+    with opened(path) as file:
+        return file.checksums
+
+
 def test_the_checksum_of_a_column_is_that_of_its_bytes_however_they_came(tmp_path):
     muons = some_muons(5000)
     with MuonWriter(tmp_path / "muons.h5", PLANE) as writer:
         for first in range(0, 5000, 1100):
             writer.append(muons[first : first + 1100])
-    assert read_checksums(tmp_path / "muons.h5") == {name: crc32(getattr(muons, name).tobytes()) for name in COLUMNS}
+    assert checksums(tmp_path / "muons.h5") == {name: crc32(getattr(muons, name).tobytes()) for name in COLUMNS}
 
 
 def test_muons_of_another_type_or_order_in_memory_are_written_as_the_format_says(tmp_path):
@@ -485,4 +530,4 @@ def test_muons_of_another_type_or_order_in_memory_are_written_as_the_format_says
     wide = Muons(**{name: np.repeat(getattr(muons, name).astype(float), 2)[::2] for name in COLUMNS})
     write_muons(tmp_path / "muons.h5", wide, PLANE)
     assert are_equal(read_muons(tmp_path / "muons.h5"), muons)
-    assert read_checksums(tmp_path / "muons.h5")["u"] == crc32(muons.u.tobytes())
+    assert checksums(tmp_path / "muons.h5")["u"] == crc32(muons.u.tobytes())

@@ -95,7 +95,7 @@ def test_both_samplers_by_hand_sample_the_same_flux():
 
 def test_the_samplers_by_hand_sample_the_flux_that_is_published():
     """Means of log E and cos zenith against EcoMug's formula as deepmuon_training has it, at 5 standard deviations."""
-    flux = pytest.importorskip("deepmuon_training.data.ecomug")
+    flux = pytest.importorskip("deepmuon_training.fluxes.ecomug")
     muons = flux.sea_level_muons(by_hand.PIECE, seed=1, minimum=5e-4, maximum=1e3)
     energy, _, _, w, _ = by_hand.inverse_cdf(np.random.default_rng(1), by_hand.PIECE)
     for a, b in ((np.log(energy), np.log(muons.kinetic_energy)), (w, muons.w)):

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from deepmuon_runtime.muons import Muons
-from deepmuon_training.data.ecomug import sea_level_muons
+from deepmuon_training.fluxes.ecomug import sea_level_muons
 from studies.pictures.smoothing import draw_smoothing
 
 

@@ -14,7 +14,7 @@ from deepmuon_runtime import read_attributes, read_muons
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muon_file.check import check_file
 from deepmuon_training.commands.train import train
-from deepmuon_training.data.ecomug import sea_level_muons
+from deepmuon_training.fluxes.ecomug import sea_level_muons
 
 COMMAND = Path(sysconfig.get_path("scripts")) / "deepmuon-train"
 ROWS = np.array([[2150.0, 0.6, 0.0, -0.8, -1], [830.0, 0.0, -0.28, -0.96, 1], [0.5, 0.0, 0.0, -1.0, 1]])
@@ -249,3 +249,10 @@ def test_an_existing_output_is_replaced_only_where_asked(convert, tmp_path):
     assert (tmp_path / "muons.h5").read_text() == "precious"
     assert convert("csv", STATED["csv"], "--overwrite -q") == ""
     assert len(read_muons(tmp_path / "muons.h5")) == 2
+
+
+@pytest.mark.parametrize("output", ["muons.csv", "muons.root", "-"])
+def test_an_output_that_promises_what_is_not_hdf5_is_refused(convert, tmp_path, output):
+    with pytest.raises(RefusedError, match=r"would be HDF5 under a name of|- is no name of a muon file"):
+        convert("csv", STATED["csv"], output=output)
+    assert [path.name for path in tmp_path.iterdir()] == ["input"]

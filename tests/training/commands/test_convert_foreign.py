@@ -14,7 +14,7 @@ from support.mcpl_file import mcpl_file
 
 from deepmuon_runtime import Muons, read_attributes, read_muons, write_muons
 from deepmuon_runtime.muon_file.check import check_file
-from deepmuon_training.data.ecomug import sea_level_muons
+from deepmuon_training.fluxes.ecomug import sea_level_muons
 
 SCRIPTS = Path(sysconfig.get_path("scripts"))
 MASS = 0.1056583755
@@ -196,6 +196,18 @@ def test_headings_name_units_and_text_is_skipped(convert, refuse):
     muons, out, _ = convert(text, "--format csv --columns skip,E,theta,phi,skip --charge -1")
     assert_muons(muons, [500], [[0, 0, -1]], [13])
     assert out[1] == "input, columns skip, E [TeV], theta [rad], phi [rad], skip: 1 row"
+
+
+def test_a_table_of_pandas_with_its_row_numbers_is_read(convert):
+    muons, out, _ = convert(",Ekin_GeV,u,v,w,charge\n0,2.5,0.6,0,-0.8,-1\n1,0.5,0,0,-1,1\n", "--format csv")
+    assert_muons(muons, [2.5, 0.5], [[0.6, 0, -0.8], [0, 0, -1]], [13, -13])
+    assert out[1] == "input, columns skip, E [GeV], u, v, w, charge: 2 rows"
+
+
+def test_columns_that_nobody_names_are_asked_for(refuse):
+    assert refuse("4000,.1,.2\n", "--format csv --charge -1") == (
+        "input has no heading that names its 3 columns (it begins with '4000,.1,.2'): give --columns"
+    )
 
 
 def test_columns_are_named_by_their_headings(convert):

@@ -342,7 +342,7 @@ def test_muons_of_another_depth_or_medium_are_not_compared(run, model, sample):
         done = subprocess.run([COMMAND, "evaluate", model, "other.h5", "-o", "x.html"], capture_output=True, text=True)
         assert (done.returncode, done.stdout) == (2, "")
         assert done.stderr == (
-            "deepmuon-train: model.onnx gives muons under 0 m of water, and the held-out ones are from under 10 m "
+            f"deepmuon-train: {model} gives muons under 0 m of water, and the held-out ones are from under 10 m "
             f"of {'rock' if 'medium' in place else 'water'}: compare muons of one place\n"
         )
         assert not Path("x.html").exists()

@@ -10,7 +10,7 @@ from deepmuon_runtime import read_attributes, read_muons
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muon_file.check import check_file
 from deepmuon_training.commands.train import train
-from deepmuon_training.data.ecomug import MUON_MASS
+from deepmuon_training.fluxes.flux import MUON_MASS
 
 
 @pytest.fixture
@@ -83,6 +83,77 @@ def test_without_a_seed_every_run_is_another(source, tmp_path):
     assert np.all(one != two)
 
 
+TABLE = "".join(
+    f"{energy},{cosine},{2 * energy**-2 * cosine},{energy**-2 * cosine}\n"
+    for cosine in (0.1, 1.0)
+    for energy in (1, 5, 50)
+)
+
+
+def test_muons_of_the_measured_flux_have_its_rate_and_its_charges(source, tmp_path):
+    source("-n 300_000 --flux measured --seed 1 -o muons.h5")
+    known, muons = read_attributes(tmp_path / "muons.h5"), read_muons(tmp_path / "muons.h5")
+    assert known["rate_hz_per_m2"] == pytest.approx(130.73, abs=0.01)  # what the study of its fit prints
+    assert known["source"] == "flux fitted to BESS-TeV (2004) and L3+C (2004), 1 MeV to 100 TeV"
+    assert known["provenance"] == ["300000 muons drawn, charges of the flux, seed 1"]
+    assert check_file(tmp_path / "muons.h5").defects == []
+    slow = muons.kinetic_energy < 0.3
+    positive = [np.mean(muons.charge[of] > 0) for of in (slow, ~slow)]
+    assert positive[0] < positive[1] - 0.01  # four standard deviations
+
+
+def test_muons_of_another_flux_say_whose_they_are(source, tmp_path):
+    source("-n 10 --flux gccly --charge-ratio 1.3 -o muons.h5")
+    known = read_attributes(tmp_path / "muons.h5")
+    assert known["source"] == "flux of Guan et al. (arXiv:1509.06176), 1 MeV to 100 TeV"
+    assert "1.3 mu+ for each mu-" in known["provenance"][0]
+
+
+def test_a_table_is_a_flux_with_its_own_energies_and_charges(source, tmp_path):
+    (tmp_path / "mine.csv").write_text(TABLE)
+    source("-n 200_000 --flux mine.csv --seed 2 -o muons.h5")
+    known, muons = read_attributes(tmp_path / "muons.h5"), read_muons(tmp_path / "muons.h5")
+    assert known["source"] == "flux of the table mine.csv, 1 GeV to 50 GeV"
+    assert muons.kinetic_energy.min() >= 1
+    assert muons.kinetic_energy.max() <= 50
+    # one false alarm in ten thousand, each
+    assert abs(np.sum(muons.charge > 0) - 2e5 * 2 / 3) < 3.9 * np.sqrt(2e5 * 2 / 9)
+    above_5 = (1 / 5 - 1 / 50) / (1 - 1 / 50)
+    assert abs(np.sum(muons.kinetic_energy > 5) - 2e5 * above_5) < 3.9 * np.sqrt(2e5 * above_5 * (1 - above_5))
+
+
+def test_a_table_that_is_read_is_never_replaced(source, tmp_path):
+    (tmp_path / "mine.csv").write_text(TABLE)
+    with pytest.raises(RefusedError, match="is read here"):
+        source("-n 10 --flux mine.csv -o mine.csv --overwrite")
+    assert (tmp_path / "mine.csv").read_text() == TABLE
+
+
+@pytest.mark.parametrize(
+    ("table", "options", "reason"),
+    [
+        (
+            "",
+            "--flux mesured",
+            "no flux and no file 'mesured': expected was measured, gccly, ecomug or a table",
+        ),
+        ("", "--flux measured --charge-ratio 1.2", "has charges of its own: no charge ratio can be asked of it"),
+        (TABLE, "--flux mine.csv --charge-ratio 1.2", "has charges of its own"),
+        (TABLE.replace("0.04", "-0.04"), "--flux mine.csv", "has a negative flux"),
+        (TABLE.replace("5,1.0,", "6,1.0,"), "--flux mine.csv", "every cos zenith needs the energies of the first"),
+        (TABLE.replace("0.04", "nan"), "--flux mine.csv", "has a number that is not finite"),
+        ("1e6,0,1,1\n1e7,0,1,1\n1e6,1,1,1\n1e7,1,1,1", "--flux mine.csv", "is of 1e+06 to 1e+07 GeV: expected were"),
+    ],
+)
+def test_what_is_no_flux_is_refused(source, tmp_path, table, options, reason):
+    (tmp_path / "mine.csv").write_text(table)
+    with pytest.raises(RefusedError) as refusal:
+        source(f"-n 10 -o muons.h5 {options}")
+    assert reason in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+    assert not (tmp_path / "muons.h5").exists()
+
+
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
@@ -92,6 +163,8 @@ def test_without_a_seed_every_run_is_another(source, tmp_path):
         ("-n 10 --charge-ratio 0 -o muons.h5", "0 is not a finite number above 0"),
         ("-n 10 --seed -1 -o muons.h5", "-1 is not from 0 to 2^64 - 1"),
         ("-n 10 -o no/muons.h5", "there is no folder"),
+        ("-n 10 -o muons.parquet", "muons.parquet would be HDF5 under a name of Parquet"),
+        ("-n 10 -o -", "- is no name of a muon file"),
     ],
 )
 def test_bad_options_are_refused(source, tmp_path, options, reason):

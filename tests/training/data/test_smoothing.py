@@ -11,9 +11,9 @@ from scipy.stats import ks_2samp
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import Muons
 from deepmuon_training.data.cry_cells import COS_ZENITH_EDGES, ENERGY_CELL
-from deepmuon_training.data.ecomug import sea_level_muons
 from deepmuon_training.data.smoothing import StepSmoother
 from deepmuon_training.data.smoothing import smoothed as smoothed_sample
+from deepmuon_training.fluxes.ecomug import sea_level_muons
 from deepmuon_training.sample import Sample
 
 N = 2_000_000

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import io
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,6 +11,7 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.terminal import terminal
 from torch import nn
 
 from deepmuon_runtime.errors import FailedError, RefusedError
@@ -260,13 +259,10 @@ def test_the_learning_rate_rises_over_a_hundredth_of_the_steps_and_falls_along_a
 
 
 def test_progress_shows_steps_loss_distance_and_time_left(monkeypatch: pytest.MonkeyPatch):
-    terminal = io.StringIO()
-    terminal.isatty = lambda: True
-    monkeypatch.setattr(sys, "stderr", terminal)
+    shown = terminal(monkeypatch)
     fit(network(), loss, distance, SCHEDULE, seed=1, name="energy", progress=True)
-    shown = terminal.getvalue()
     for part in ("energy:", "60/60", "loss=", "distance=", "<00:00"):
-        assert part in shown
+        assert part in shown.getvalue()
 
 
 def test_a_quiet_fit_says_nothing(capfd: pytest.CaptureFixture[str]):

@@ -6,7 +6,7 @@ from math import log
 import pytest
 from matplotlib.image import imread
 
-from deepmuon_training.data.ecomug import sea_level_muons
+from deepmuon_training.fluxes.ecomug import sea_level_muons
 from deepmuon_training.reports.pictures import draw_charge, draw_energy, draw_pictures, draw_zenith
 from deepmuon_training.scores.evaluate import evaluate
 from deepmuon_training.scores.evaluation import Evaluation

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from deepmuon_runtime.muons import Muons
-from deepmuon_training.data.ecomug import sea_level_muons
+from deepmuon_training.fluxes.ecomug import sea_level_muons
 from deepmuon_training.scores.azimuth import compare_azimuth
 
 

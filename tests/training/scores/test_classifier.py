@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from deepmuon_runtime.muons import MU_PLUS
-from deepmuon_training.data.ecomug import sea_level_muons
+from deepmuon_training.fluxes.ecomug import sea_level_muons
 from deepmuon_training.scores.classifier import classify
 
 

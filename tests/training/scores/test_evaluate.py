@@ -10,7 +10,7 @@ import pytest
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import MU_MINUS, Muons
-from deepmuon_training.data.ecomug import sea_level_muons
+from deepmuon_training.fluxes.ecomug import sea_level_muons
 from deepmuon_training.scores.evaluate import FEWEST_MUONS, evaluate
 from deepmuon_training.scores.evaluation import Evaluation
 from deepmuon_training.scores.score import Score

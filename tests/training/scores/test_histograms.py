@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
-from deepmuon_training.data.ecomug import sea_level_muons
+from deepmuon_training.fluxes.ecomug import sea_level_muons
 from deepmuon_training.scores.histograms import (
     ENERGY_EDGES,
     compare_cells,

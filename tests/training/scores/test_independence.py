@@ -7,7 +7,7 @@ import pytest
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import Muons
-from deepmuon_training.data.ecomug import sea_level_muons
+from deepmuon_training.fluxes.ecomug import sea_level_muons
 from deepmuon_training.scores.independence import Independence, measure_independence
 
 SIZE = 1_024_000

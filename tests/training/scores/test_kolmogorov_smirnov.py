@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from deepmuon_training.data.ecomug import sea_level_muons
+from deepmuon_training.fluxes.ecomug import sea_level_muons
 from deepmuon_training.scores.kolmogorov_smirnov import kolmogorov_smirnov
 
 samples = st.lists(st.integers(-5, 5) | st.floats(-5, 5, width=32), min_size=2, max_size=40)

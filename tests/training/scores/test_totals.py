@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from deepmuon_runtime.muons import MU_MINUS, Muons
-from deepmuon_training.data.ecomug import sea_level_muons
+from deepmuon_training.fluxes.ecomug import sea_level_muons
 from deepmuon_training.scores.totals import compare_charge_ratio, compare_rate, count_unphysical, is_physical
 
 RANGE = (1e-3, 1e5)

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from deepmuon_runtime.errors import FailedError, RefusedError
 from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
 from deepmuon_training.sample import Sample
 from deepmuon_training.transport import slab as transport_module
-from deepmuon_training.transport.slab import Transported, transport
+from deepmuon_training.transport.slab import Transported, below_slab, transport
 
 
 def sample_of(
@@ -197,6 +198,13 @@ def test_the_survivors_carry_rate_depth_and_provenance() -> None:
     assert after.rate_uncertainty == pytest.approx(100 * fraction * math.hypot(2 / 100, error / fraction))
     assert "4 m of G4_WATER" in after.provenance[-1]
     assert "seed 16" in after.provenance[-1]
+
+
+def test_the_error_of_a_slab_is_kept_where_that_of_the_rate_above_is_unknown() -> None:
+    above = replace(sample_of(10.0), rate_uncertainty=None)
+    below = below_slab(above, 1000, 400, 10.0, "G4_WATER", "seed 1")
+    assert below.rate == pytest.approx(40)
+    assert below.rate_uncertainty == pytest.approx(100 * math.sqrt(0.4 * 0.6 / 1000))
 
 
 def test_an_unknown_rate_stays_unknown() -> None:

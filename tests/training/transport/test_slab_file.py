@@ -4,10 +4,11 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
-from deepmuon_runtime.errors import FailedError
+from deepmuon_runtime.errors import FailedError, RefusedError
 from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
 from deepmuon_training.sample import Sample, read_sample, write_sample
 from deepmuon_training.transport import slab_file as module
@@ -46,6 +47,14 @@ def assert_same(found: Sample, expected: Sample) -> None:
             assert getattr(found, field.name) == getattr(expected, field.name), field.name
     for field in fields(Muons):
         np.testing.assert_array_equal(getattr(found.muons, field.name), getattr(expected.muons, field.name))
+
+
+def test_damaged_muons_are_refused_before_any_is_carried(upper: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(module, "transport")
+    with h5py.File(upper, "r+") as file:
+        file["muons/kinetic_energy"][-1] *= 2
+    with pytest.raises(RefusedError, match="is damaged: the column kinetic_energy is not what was written"):
+        carry(upper, "lower")
 
 
 def test_the_survivors_are_those_of_the_parts_each_with_its_own_seed(upper: Path) -> None:

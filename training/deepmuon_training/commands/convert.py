@@ -131,13 +131,13 @@ def command(input_file: Path, output: Path, form: str, overwrite: bool, quiet: b
     is asked for where the format is CRY's.
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime import new_seed
-    from deepmuon_runtime.files.output import check_output
+    from deepmuon_runtime.muon_file.output import check_muon_output
     from deepmuon_runtime.muon_file.writer import write_muons
     from deepmuon_training.data.conversion import draw_charges
     from deepmuon_training.data.foreign.root_table import file_of
 
     _check_options(form, stated)
-    check_output(output, overwrite, [file_of(input_file) if form == "root" else input_file])
+    check_muon_output(output, overwrite, [file_of(input_file) if form == "root" else input_file])
     stated["seed"] = new_seed() if stated["seed"] is None else stated["seed"]
     sample, exposure = _read(input_file, form, stated)
     sample = _smoothed(sample, stated["smooth"])

@@ -74,12 +74,12 @@ def command(
     nothing is written.
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime import new_seed
-    from deepmuon_runtime.files.output import check_output
+    from deepmuon_runtime.muon_file.output import check_muon_output
     from deepmuon_training.sample import read_sample, write_sample
     from deepmuon_training.transport.material import medium
     from deepmuon_training.transport.slab import refuse_none, transport
 
-    check_output(output, overwrite, [muons])
+    check_muon_output(output, overwrite, [muons])
     seed = new_seed() if seed is None else seed
     carried = transport(
         read_sample(muons),

@@ -8,7 +8,8 @@ import h5py
 import numpy as np
 
 from deepmuon_runtime.errors import RefusedError, reason
-from deepmuon_runtime.muon_file.damage import READ_ERRORS
+from deepmuon_runtime.muon_file.columns import storage_defects
+from deepmuon_runtime.muon_file.damage import READ_ERRORS, member
 from deepmuon_runtime.muons import Muons
 from deepmuon_runtime.physical import LOWEST_ENERGY
 from deepmuon_training.data.conversion import warn_of_dropped
@@ -61,9 +62,11 @@ def read_cry(path: str | Path, part: slice = slice(None)) -> Sample:
         If the file can't be read, lacks a column, has a row that is no muon, or no muon of 1 MeV in these rows.
     """
     try:
+        if Path(path).exists() and not Path(path).is_file():
+            raise ValueError("it is a folder, a pipe or a device")
         with h5py.File(path) as file:
+            columns = {name: _column(file, name) for name in CRY_COLUMNS}
             group = file["muons"]
-            columns = {name: group[name] for name in CRY_COLUMNS}
             lengths = {column.shape for column in columns.values()}
             if len(lengths) > 1 or columns["charge"].ndim != 1:
                 raise ValueError(f"the columns have the shapes {', '.join(map(str, sorted(lengths)))}")
@@ -97,3 +100,13 @@ def read_cry(path: str | Path, part: slice = slice(None)) -> Sample:
         variance_factor=CRY_VARIANCE_FACTOR,
         flux="cry",
     )
+
+
+def _column(file: h5py.File, name: str) -> h5py.Dataset:
+    """Return a column that is stored in the file itself, and whole."""
+    column = member(file, f"muons/{name}")
+    if not isinstance(column, h5py.Dataset):
+        raise ValueError(f"there is no column {name}")
+    for defect in storage_defects(column):
+        raise ValueError(f"the column {name} {defect}")
+    return column

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from deepmuon_runtime import read_attributes, read_muons
+from deepmuon_runtime.muon_file.reader import read_attributes, read_pieces
 from deepmuon_training.pipeline.layer import Layer
 from deepmuon_training.sample import read_sample
 from deepmuon_training.scores.evaluation import Evaluation
@@ -93,8 +93,8 @@ def _mean_energy(path: Path) -> tuple[float, float]:
     """Return the mean kinetic energy [GeV] of a file's muons, and its standard error."""
     number = _count(path)
     total, squares = 0.0, 0.0
-    for first in range(0, number, _CHUNK):
-        energy = read_muons(path, first, min(_CHUNK, number - first)).kinetic_energy.astype(np.float64)
+    for muons in read_pieces(path, _CHUNK):
+        energy = muons.kinetic_energy.astype(np.float64)
         total, squares = total + energy.sum(), squares + np.square(energy).sum()
     mean = total / number
     return float(mean), math.sqrt(max(0.0, squares / number - mean**2) / number)

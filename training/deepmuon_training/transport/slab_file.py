@@ -9,7 +9,7 @@ from numpy.random import SeedSequence
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muon_file.check import check_file
-from deepmuon_runtime.muon_file.reader import read_attributes, read_muons
+from deepmuon_runtime.muon_file.reader import read_attributes, read_muons, verify_muons
 from deepmuon_runtime.muon_file.writer import MuonWriter
 from deepmuon_training.progress import progress_bar
 from deepmuon_training.sample import read_sample, write_sample
@@ -56,13 +56,14 @@ def transport_file(
     Raises
     ------
     RefusedError
-        As for `transport`, or if `target` can't be written.
+        As for `transport`, or if `source` is damaged or `target` can't be written.
     FailedError
         If Geant4 fails, or nothing survives.
     """
     upper = read_sample(source, 0, 0)
     overburden = medium(material, density)
     started = int(read_attributes(source)["count"])
+    verify_muons(source)  # which its parts can't be
     parts = []
     with progress_bar(started, target.stem, " muons", hidden=not progress) as bar:
         for index, first in enumerate(range(0, started, muons_per_part)):

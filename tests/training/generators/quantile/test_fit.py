@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 from scipy.stats import ks_2samp
+from support.terminal import terminal
 
 from deepmuon_runtime import Generator
 from deepmuon_training.export.metadata import Training
@@ -122,10 +123,10 @@ def test_a_killed_training_goes_on_to_the_same_generator(few, undisturbed, tmp_p
     assert resumed.tails == undisturbed.tails
 
 
-def test_progress_is_shown_only_if_wanted(few, capfd):
+def test_progress_is_shown_only_if_wanted(few, monkeypatch):
+    shown = terminal(monkeypatch)
     fit_quantile(few, seed=1, schedules=TINY, progress=False)
-    assert capfd.readouterr() == ("", "")
+    assert shown.getvalue() == ""
     fit_quantile(few, seed=1, schedules=TINY)
-    shown = capfd.readouterr().err
-    assert "charge:" in shown
-    assert "zenith" in shown
+    assert "charge:" in shown.getvalue()
+    assert "zenith" in shown.getvalue()

@@ -9,6 +9,7 @@ import pytest
 import torch
 from scipy.special import expit, logit
 from scipy.stats import kstest, norm
+from support.terminal import terminal
 
 from deepmuon_runtime.errors import FailedError, RefusedError
 from deepmuon_training.generators.quantile import regression as quantile_regression
@@ -117,11 +118,12 @@ def test_the_checkpoint_of_another_regression_is_refused(tmp_path):
         trained(SHORT, seed=3, checkpoint=tmp_path / "zenith.pt")
 
 
-def test_progress_changes_nothing(capfd):
+def test_progress_changes_nothing(monkeypatch):
+    written = terminal(monkeypatch)
     shown, quiet = (trained(SHORT, progress=progress) for progress in (True, False))
     assert torch.equal(weights(shown[0]), weights(quiet[0]))
     assert shown[1] == quiet[1]
-    assert "4/4" in capfd.readouterr().err
+    assert "4/4" in written.getvalue()
 
 
 def losses(monkeypatch, values: list[float]) -> list[torch.Tensor]:

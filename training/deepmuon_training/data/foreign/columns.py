@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import Muons
-from deepmuon_training.data.ecomug import MUON_MASS
 from deepmuon_training.data.foreign.muons import CHARGE_UNKNOWN, FEW_DIGITS, foreign_muons, pdg_id_of
 from deepmuon_training.data.foreign.particles import MUON_IDS, muon_ids, refuse_others
 from deepmuon_training.data.foreign.table import Float, Place
+from deepmuon_training.fluxes.flux import MUON_MASS
 
 __all__ = ["ANGLES", "KNOWN", "UNITS", "Columns"]
 

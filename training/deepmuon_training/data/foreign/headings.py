@@ -71,7 +71,8 @@ def columns_of(table: Table, stated: str | None, unit: str | None, angle: str | 
 
 def _from_headings(table: Table) -> list[str]:
     if not table.headings:
-        raise RefusedError(f"{table.path} has no heading that names its {table.width} columns: give --columns")
+        begins = f" (it begins with {table.first_line})" if table.first_line else ""
+        raise RefusedError(f"{table.path} has no heading that names its {table.width} columns{begins}: give --columns")
     names = []
     for heading in table.headings:
         meanings = MEANINGS.get(_split(heading)[0], ("skip",))

@@ -35,6 +35,8 @@ class Table:
         The names of the columns; none where the file has none.
     notes : mapping
         What comments of `deepmuon-csv` say, by the names of a muon file's attributes.
+    first_line : str
+        Of a text, as it can be shown.
     """
 
     path: str | Path
@@ -42,6 +44,7 @@ class Table:
     rows: Callable[[Sequence[int]], Iterator[tuple[Place, Float]]]
     headings: tuple[str, ...] = ()
     notes: Mapping[str, Any] = field(default_factory=dict)
+    first_line: str = ""
 
 
 def numbered(path: str | Path, kind: str, first: int) -> Place:

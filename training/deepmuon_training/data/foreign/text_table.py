@@ -59,14 +59,15 @@ def open_text(path: str | Path, width: int | None = None, *, ends_with_newline: 
     top = next(pieces, None)
     if top is None:
         raise RefusedError(f"{path} has no line of numbers: it {'holds comments alone' if comments else 'is empty'}")
-    separator = _separator(top.texts[0])
-    fields = _fields(top.texts[0], separator)
+    first = top.texts[0]
+    separator = _separator(first)
+    fields = _fields(first, separator)
     headings = tuple(fields) if _is_heading(fields) else ()
     width = width or len(fields)
     if headings:
         if len(headings) != width:
             raise RefusedError(
-                f"{path}, line {top.numbers[0]}: {_shown(top.texts[0])} is no heading of {width} columns: a comment "
+                f"{path}, line {top.numbers[0]}: {_shown(first)} is no heading of {width} columns: a comment "
                 "begins with #"
             )
         top = Lines(top.numbers[1:], top.texts[1:])
@@ -80,6 +81,7 @@ def open_text(path: str | Path, width: int | None = None, *, ends_with_newline: 
         lambda wanted: _rows(path, pieces, width, list(wanted), separator),
         headings,
         _notes(comments),
+        _shown(first),
     )
 
 
@@ -115,8 +117,9 @@ def _fields(line: str, separator: str | None) -> list[str]:
 
 
 def _is_heading(fields: Sequence[str]) -> bool:
-    """Tell whether these can be the names of columns."""
-    return len(set(fields)) == len(fields) > 1 and all(map(_is_name, fields))
+    """Tell whether these can be the names of columns; one may have none, as the row numbers of pandas."""
+    names = [field for field in fields if field]
+    return len(names) > 1 and len(set(fields)) == len(fields) and all(map(_is_name, names))
 
 
 def _is_name(field: str) -> bool:
@@ -155,21 +158,27 @@ def _line_of(path: str | Path, numbers: Sequence[int]) -> Place:
 
 def _parse(texts: list[str], width: int, wanted: list[int], separator: str | None) -> Float | None:
     """Return the numbers, or None if a line is anything else."""
+    if any(line.count('"') % 2 for line in texts):  # NumPy would look for the end in the lines below
+        return None
     # A text of one letter takes what is not wanted: NumPy then counts the columns, and reads no number there.
     columns = np.dtype([(str(i), "f8" if i in wanted else "U1") for i in range(width)])
-    for changed in (list, _modern):
+    for is_plain in (True, False):
+        lines = texts if is_plain else _plain(texts, separator)
         try:
-            rows = np.loadtxt(changed(texts), columns, delimiter=separator, comments=None, quotechar='"', ndmin=1)
+            rows = np.loadtxt(lines, columns, delimiter=separator, comments=None, quotechar='"', ndmin=1)
         except ValueError:
             continue
-        if len(rows) == len(texts):  # a quote without an end joins lines
+        if len(rows) == len(texts):  # a quote inside a field may still join lines
             return np.stack([rows[str(i)] for i in wanted], axis=1)
     return None
 
 
-def _modern(texts: list[str]) -> list[str]:
-    """Write Fortran's exponents as all others do."""
-    return FORTRAN.sub(r"e\1\2", "\n".join(texts)).split("\n")
+def _plain(texts: list[str], separator: str | None) -> list[str]:
+    """Write Fortran's exponents as all others do, and leave blanks beside quotes out, which NumPy takes for text."""
+    text = FORTRAN.sub(r"e\1\2", "\n".join(texts))
+    if separator is not None and '"' in text:
+        text = re.sub(rf'(?<=") *{separator}', separator, re.sub(rf'{separator} *(?=")', separator, text))
+    return text.split("\n")
 
 
 def _first_bad(texts: list[str], width: int, wanted: list[int], separator: str | None) -> int:
@@ -190,6 +199,8 @@ def _why(line: str, width: int, wanted: list[int], separator: str | None) -> str
         fields = line.split(mark)
         if len(fields) > 1 and any(DECIMAL_COMMA.fullmatch(field.strip()) for field in fields):
             return "it looks like decimal commas, write decimal points"
+    if line.count('"') % 2:
+        return "a quote has no end"
     fields = _fields(line, separator)
     if len(fields) != width:
         return f"it has {len(fields)}"

@@ -9,7 +9,8 @@ import pytest
 from scipy.integrate import dblquad
 from scipy.stats import chisquare, kstest
 
-from deepmuon_training.data.ecomug import MUON_MASS, intensity, plane_rate, sea_level_muons
+from deepmuon_training.fluxes.ecomug import intensity, plane_rate, sea_level_muons
+from deepmuon_training.fluxes.flux import MUON_MASS
 
 
 def momentum(kinetic_energy):

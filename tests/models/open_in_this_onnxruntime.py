@@ -1,9 +1,8 @@
 """Runs every released model in whatever ONNX Runtime is there, with nothing but NumPy.
 
-CI runs this program with ONNX Runtime 1.17.3, NumPy 1 and Python 3.10, which are older than what
-deepmuon-runtime asks for: the files promise to work there.
+The program beside it runs this one in each release of ONNX Runtime.
 
-    python open_in_oldest_onnxruntime.py FOLDER
+    python open_in_this_onnxruntime.py FOLDER
 """
 
 from __future__ import annotations
