@@ -71,7 +71,11 @@ class QuantileFamily:
     @cached_property
     def _stacks(self) -> dict[str, NDArray[np.float32]]:
         """Tables by name, each [surfaces x knots, numbers]."""
-        return {name: _stack([getattr(knot, name) for knot in (*self.planes, *self.spheres)]) for name in _TABLES}
+        stacks = {name: _stack([getattr(knot, name) for knot in (*self.planes, *self.spheres)]) for name in _TABLES}
+        # Where all knots are sure of a charge, it is sure between them, however weights round: beyond 1, it is clipped.
+        sure = np.abs(stacks["charge"].sum(axis=0)) == len(stacks["charge"])
+        stacks["charge"] = np.where(sure, 2 * stacks["charge"], stacks["charge"])
+        return stacks
 
     def at(self, depth_m: float, surface: int = 0) -> QuantileTables:
         """Return the tables at a depth, in double precision."""
