@@ -93,7 +93,7 @@ def test_the_fit_is_that_of_the_architecture(read):
         ("[transformer]\ncalibration = 0", "transformer: calibration is 0, and should be from 1,000"),
         ("[transformer]\ndirections = 0", "transformer: directions is 0, and should be from 1"),
         ("direct = 1", "direct is 1, and should be true or false"),
-        ('architecture = "transformer"\nfamily = true', "family is true, which needs an architecture that makes families"),
+        ('architecture = "transformer"\nfamily = true', "family is true, which needs an architecture that"),
         ('azimuth = "learned"\nfamily = true', "family is true, which needs"),
         ("layers = 0\nfamily = true", "family is true, which needs"),
         ("material = 3", 'material is 3, and should be a text in "quotes"'),
