@@ -16,6 +16,7 @@ from support.engines import reference_evaluator
 from deepmuon_runtime import Generator
 from deepmuon_runtime.errors import FailedError, RefusedError
 from deepmuon_runtime.latents.philox import latents
+from deepmuon_runtime.model.baking import bake
 from deepmuon_runtime.model.family import at_depth
 from deepmuon_training.export.family_export import export_family
 from deepmuon_training.export.metadata import Training
@@ -23,6 +24,7 @@ from deepmuon_training.export.onnx_export import export
 from deepmuon_training.families.rates import KnownRate
 from deepmuon_training.generators.quantile.family import QuantileFamily, quantile_family
 from deepmuon_training.generators.quantile.tables import QuantileTables
+from deepmuon_training.generators.read_back import read_back
 
 DEPTHS = (0.0, 0.5, 2.0, 5.0, 12.0)
 OUTPUTS = ["kinetic_energy", "direction", "charge", "rate_hz_per_m2"]
@@ -152,6 +154,12 @@ def test_every_engine_gives_the_muons_of_the_depth(file, family, engine, depth, 
     assert np.sum(off > 1e-5) <= 2  # a latent within rounding of another row of the table
     assert np.sum(charge != right[2].numpy()) <= 2
     assert rate[0] == pytest.approx(family.rate(depth, surface), rel=1e-5)
+
+
+def test_a_file_baked_from_it_holds_the_tables_of_its_depth(file, family):
+    found, right = read_back(bake(file.read_bytes(), 3.3)), family.at(float(np.float32(3.3)))
+    for name in "energy", "zenith", "charge":
+        np.testing.assert_allclose(getattr(found, name), getattr(right, name), rtol=1e-5, atol=2e-6, err_msg=name)
 
 
 def test_the_runtime_opens_it_at_any_depth(file, family):

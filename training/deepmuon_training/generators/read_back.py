@@ -10,6 +10,9 @@ from deepmuon_training.generators.registry import architecture
 
 __all__ = ["read_back", "read_numbers"]
 
+BAKED = "baked_from"
+"""Metadata of a file that the runtime made of a family."""
+
 
 def read_back(contents: bytes) -> Exportable:
     """Return the generator that a file was exported from, as stored numbers.
@@ -27,6 +30,8 @@ def read_back(contents: bytes) -> Exportable:
     """
     stored = StoredGenerator(contents)
     generator = _numbers(stored)
+    if BAKED in stored.metadata:  # a family's nodes, with tables in the place of the first of them
+        return generator
     again = generator.graph()[0]
     if RATE in stored.constants:
         again.constant(stored.constants[RATE], RATE)
