@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
@@ -9,6 +10,10 @@ from pathlib import Path
 DOCS = Path(__file__).parent
 # The training package is read from its sources: installing it would bring PyTorch and Geant4. The root is for studies.
 sys.path[:0] = [str(DOCS / "_extensions"), str(DOCS.parent), str(DOCS.parent / "training")]
+
+from deepmuon_training.transport.geant4_data import without_data_sets  # noqa: E402 - from the sources
+
+os.environ.update(without_data_sets())  # where Geant4 is installed, its import would ask for a download
 
 project = "DeepMuon"
 author = "The DeepMuon developers"

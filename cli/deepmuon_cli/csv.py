@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -67,10 +68,10 @@ def csv(
 
     if side is None:
         texts = csv_pieces(file, unit=units, header=not no_header)
-    elif side > 0:
+    elif 0 < side < math.inf:
         texts = phits_pieces(file, side=side, seed=new_seed() if seed is None else seed)
     else:
-        raise RefusedError(f"a square of {side:g} m has no place for muons: --phits takes a length above 0")
+        raise RefusedError(f"a square of {side:g} m has no place for muons: --phits takes a finite length above 0")
     pieces = (text.encode() for text in texts)
     if str(output) == "-":
         verify_muons(file, progress=lambda _: show_life())

@@ -134,6 +134,9 @@ def test_a_file_of_no_muon_is_a_header(csv, tmp_path):
         (["muons.h5", "-o", "a" * 300], "can't be written: File name too long"),
         (["a" * 300, "-o", "muons.csv"], "can't be read as a muon file: File name too long"),
         (["muons.h5", "-o", "muons.csv", "--units", "keV"], "'keV' is not one of"),
+        (["muons.h5", "-o", "muons.phits", "--phits", "0"], "--phits takes a finite length above 0"),
+        (["muons.h5", "-o", "muons.phits", "--phits", "inf"], "--phits takes a finite length above 0"),
+        (["muons.h5", "-o", "muons.phits", "--phits", "10m"], "10m is no number of metres: write 10"),
     ],
 )
 def test_what_can_t_be_done_is_refused_and_leaves_nothing(csv, tmp_path, arguments, reason):

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import json
-import os
 import struct
 import subprocess
-import sys
 import sysconfig
 from collections import Counter
 from collections.abc import Callable
@@ -16,13 +13,13 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from support.commands import endings
 from support.muon_files import sign_attributes, write_version_1
 from support.thorough import TIMES
 
 from deepmuon_runtime import Generator, Shard, check_file, read_attributes, read_muons
 
 SCRIPTS = Path(sysconfig.get_path("scripts"))
-RUN_MANY = Path(__file__).parents[1] / "support" / "run_many.py"
 SEED = 5
 
 ARGUMENTS = {
@@ -191,7 +188,7 @@ def test_no_attribute_of_any_kind_ends_a_command_by_a_traceback(folder, command,
         names = {"muons.h5": path, "other.h5": folder / "other.h5"}
         names |= {f"out.{end}": folder / f"out-{number}.{end}" for end in ("csv", "h5", "png")}
         lines.append([str(names.get(word, word)) for word in ARGUMENTS[command]])
-    found = endings("merge" if command == "virtual merge" else command, lines)
+    found = Counter(endings("merge" if command == "virtual merge" else command, lines))
     assert found.keys() <= {0, 2, 3}
     assert found[3 if command == "check" else 2] > 10 * TIMES
 
@@ -201,17 +198,3 @@ def sign_if_it_can_be(muons: h5py.Group) -> None:
         sign_attributes(muons)
     except (AttributeError, ValueError, TypeError, struct.error):
         return
-
-
-def endings(command: str, lines: list[list[str]]) -> Counter[int]:
-    """Run a command with each line of arguments, and count the exit codes."""
-    done = subprocess.run(
-        [sys.executable, RUN_MANY, command],
-        input="".join(f"{json.dumps(line)}\n" for line in lines),
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},  # no thread may run when a process forks
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert "Traceback" not in done.stderr
-    return Counter(map(int, done.stdout.split()))

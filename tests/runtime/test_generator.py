@@ -356,7 +356,7 @@ def test_a_depth_that_is_no_number_is_refused(depth):
 @pytest.mark.usefixtures("released")
 @pytest.mark.parametrize("number", [np.float32(10), np.int64(10)], ids=repr)
 def test_numpys_numbers_are_numbers(number):
-    assert len(Generator.open(depth=number).sample(number, seed=number)) == 10
+    assert len(Generator.open(depth=number).sample(number, seed=np.int64(number))) == 10
 
 
 @pytest.mark.usefixtures("released")

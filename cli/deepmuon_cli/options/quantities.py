@@ -197,7 +197,10 @@ def _meant(text: str, units: Mapping[str, float]) -> list[float]:
         return []
     digits, unit = match[1], (match[2] or "").lower()
     factor = units.get(unit, units.get(unit.removesuffix("s"))) if unit else 1
-    return [] if factor is None else list(dict.fromkeys(reading * factor for reading in _readings(digits)))
+    if factor is None:
+        return []
+    meant = dict.fromkeys(reading * factor for reading in _readings(digits.replace("_", "")))
+    return [number for number in meant if math.isfinite(number)]
 
 
 def _readings(digits: str) -> list[float]:

@@ -50,6 +50,7 @@ def check_muon_output(path: str | Path, overwrite: bool = False, inputs: Iterabl
     RefusedError
         As `check_output`, and if the name promises what is not HDF5: the name of another format, or - for stdout.
     """
+    check_output(path, True, inputs)  # first of all: what is read is never replaced, whatever its name
     name = Path(path).name
     if str(path) == "-":
         raise RefusedError(

@@ -201,8 +201,9 @@ def test_finished_steps_are_not_repeated(folder: Path, run: Path):
 @pytest.mark.parametrize("name", ["quantile-0m.pt", "quantile-0m.onnx", "drawn-0m.h5", "muons-1m.h5", "quantile-1m.pt"])
 def test_a_run_with_a_damaged_file_is_refused_in_one_line_that_says_what_to_do(folder: Path, run: Path, name: str):
     content = (run / name).read_bytes()
+    middle = slice(len(content) // 2, len(content) // 2 + 400)
     damaged = bytearray(content)
-    damaged[len(content) // 2 : len(content) // 2 + 400] = bytes(400)
+    damaged[middle] = bytes(byte ^ 0xFF for byte in content[middle])
     try:
         (run / name).write_bytes(damaged)
         code, out, err = command(folder, "tiny.toml", "sea.h5", "--work", "run", "--held-out", "held_out.h5")
@@ -283,7 +284,7 @@ def test_a_direct_plan_carries_each_layers_own_muons(folder: Path):
     settings = replace(read_pipeline_settings(folder / "tiny.toml"), direct=True, layers=2)
     pipeline = plan(settings, folder / "sea.h5", folder / "nowhere")
     assert [layer.carried.name for layer in pipeline.layers[:2]] == ["sea.h5", "muons-1m.h5"]
-    assert {step.kind for step in pipeline.layer} == {"fit", "export", "transport"}
+    assert {step.kind for step in pipeline.steps} == {"fit", "export", "transport"}
     assert not (folder / "nowhere").exists()
 
 
@@ -384,9 +385,9 @@ def test_a_slab_that_too_few_muons_cross_ends_the_run(folder: Path, tmp_path: Pa
     settings = replace(read_pipeline_settings(folder / "tiny.toml"), layer_m=60.0, direct=True)
     pipeline = plan(settings, folder / "sea.h5", tmp_path / "run")
     (tmp_path / "run").mkdir()
-    pipeline.layer[2].run(progress=False)
+    pipeline.steps[2].run(progress=False)
     with pytest.raises(FailedError, match=r"fit what came through at 60 m: \d+ muons are too few to learn from"):
-        pipeline.layer[3].run(progress=False)
+        pipeline.steps[3].run(progress=False)
 
 
 def test_a_run_may_end_in_a_family_of_its_generators(folder: Path):

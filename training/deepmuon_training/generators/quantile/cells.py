@@ -79,7 +79,7 @@ _DITHER_BITS = 4
 def energy_logit(l0: torch.Tensor, l1: torch.Tensor) -> torch.Tensor:
     """Return the logit t of the energy's level for its two latents, clamped before.
 
-    p = (1 - |l0|) + 2^-24 l1 is the tail probability on the side of l0, twice that of the whole. Counting it from
+    p = (1 - abs(l0)) + 2^-24 l1 is the tail probability on the side of l0, twice that of the whole. Counting it from
     both ends, p and 2 - p to a part in 2^24, keeps the digits of the nearer one without asking for the side.
     """
     fine = FINE_STEP * l1
