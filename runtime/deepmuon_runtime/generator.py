@@ -19,7 +19,7 @@ from deepmuon_runtime.errors import FailedError, RefusedError, first_line
 from deepmuon_runtime.latents.philox import checked_seed, fill_latents, new_seed
 from deepmuon_runtime.latents.poisson import poisson
 from deepmuon_runtime.latents.shard import WHOLE_RUN, Shard
-from deepmuon_runtime.model.metadata import LATENTS_PER_MUON, Model
+from deepmuon_runtime.model.metadata import LATENTS_PER_MUON, SPHERE, Model
 from deepmuon_runtime.model.released import read_released, released_model
 from deepmuon_runtime.muon_file.format import BYTES_PER_MUON
 from deepmuon_runtime.muon_file.output import check_muon_output
@@ -250,6 +250,8 @@ class Generator:
     def number_in_live_time(self, live_time: float, area: float, seed: int) -> int:
         """Draw the number of muons that cross a horizontal area: a Poisson number at the model's rate.
 
+        Of a model whose muons cross a sphere, the area is that of its cross-section.
+
         Parameters
         ----------
         live_time
@@ -293,6 +295,7 @@ class Generator:
             "architecture": model.architecture,
             "device": self.device,
             **{name: rate for name, rate in rates.items() if rate is not None},
+            **({"surface": model.surface} if model.surface == SPHERE else {}),
         }
 
     def _parts(self, numbers: range) -> Iterator[range]:

@@ -28,6 +28,7 @@ RATE = np.float32([[[110], [10], [2]], [[150], [14], [3]]])  # /(m2 s)
 FAMILY = {
     **METADATA,
     "contract_version": "2",
+    "depth_m": "10",
     "flux": "test",
     "medium": "water",
     "surface": "0",
@@ -64,15 +65,16 @@ def tiny_family(
     """
     constants: dict[str, Any] = {
         "depth_m": np.float32(10),
-        "knots": np.float32([0, 1, 2]),
+        "knots": np.float32([[0, 1, 2]]),
         "spacing": np.float32(50),
         "one": np.float32(1),
         "maps/energy": LOG_ENERGY,
         "maps/zenith": COS_ZENITH,
         "maps/charge": THRESHOLD,
         "maps/rate": RATE,
-        "refined": np.int64([1, 1, REFINED]),
-        "as_image": np.int64([1, 1, -1]),
+        "energy/refining": _refining(5),
+        "zenith/refining": _refining(4),
+        "as_row": np.int64([1, -1]),
         "flat": np.int64([-1]),
         "low": np.float32(-1),
         "high": np.float32(1),
@@ -124,6 +126,12 @@ def _between(maps: np.ndarray, depth_m: float) -> np.ndarray:
     return np.array([np.interp(depth_m, KNOTS, column) for column in maps.T.astype(float)])
 
 
+def _refining(size: int) -> np.ndarray:
+    """Return the matrix that interpolates a table of so many numbers linearly."""
+    at = np.linspace(0, size - 1, REFINED)
+    return np.float32(np.maximum(0, 1 - np.abs(at - np.arange(size)[:, None])))
+
+
 _Node = tuple[str, Sequence[str], list[str], dict[str, Any]]
 
 
@@ -141,7 +149,8 @@ def _depth(has_sphere: bool) -> list[_Node]:
         if has_sphere:
             nodes.append(("Gather", [maps, "surface"], [f"depth/maps_{table}"], {"axis": 0}))
             maps = f"depth/maps_{table}"
-        nodes.append(("MatMul", ["depth/weights", maps], [end], {}))
+        nodes.append(("MatMul", ["depth/weights", maps], [f"depth/row_{table}"], {}))
+        nodes.append(("Reshape", [f"depth/row_{table}", "flat"], [end], {}))
     return nodes
 
 
@@ -151,11 +160,10 @@ def _muons() -> list[_Node]:
     for k in range(4):
         nodes.append(("Gather", ["latent/clipped", f"column_{k}"], [f"latent/{k}"], {"axis": 1}))
     for k, table in enumerate(("energy", "zenith")):
-        resize = {"mode": "linear", "coordinate_transformation_mode": "align_corners"}
         nodes += [
-            ("Reshape", [f"{table}/table", "as_image"], [f"{table}/image"], {}),
-            ("Resize", [f"{table}/image", "", "", "refined"], [f"{table}/resized"], resize),
-            ("Reshape", [f"{table}/resized", "flat"], [f"{table}/refined"], {}),
+            ("Reshape", [f"{table}/table", "as_row"], [f"{table}/row"], {}),
+            ("MatMul", [f"{table}/row", f"{table}/refining"], [f"{table}/refined_row"], {}),
+            ("Reshape", [f"{table}/refined_row", "flat"], [f"{table}/refined"], {}),
             ("Add", [f"latent/{k}", "one"], [f"{table}/from_start"], {}),
             ("Mul", [f"{table}/from_start", "scale"], [f"{table}/position"], {}),
             ("Cast", [f"{table}/position"], [f"{table}/index"], {"to": TensorProto.INT32}),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import RefusedError, first_line
 from deepmuon_runtime.model.device import open_session
-from deepmuon_runtime.model.family import at_depth, with_metadata
+from deepmuon_runtime.model.family import with_metadata
 from deepmuon_runtime.model.metadata import HORIZONTAL_PLANE
 from deepmuon_runtime.model.opening import checked_model, load_model
 from deepmuon_runtime.model.protobuf import field, parts, varint_field, with_changed
@@ -38,21 +38,21 @@ def bake(contents: bytes, depth_m: float, surface: int = HORIZONTAL_PLANE, name:
     Parameters
     ----------
     contents, depth_m, surface, name
-        As for `at_depth`.
+        As for `deepmuon_runtime.model.family.at_depth`.
 
     Raises
     ------
     RefusedError
-        As `checked_model`, `load_model` and `at_depth`, or if the nodes whose names begin with `depth/` need latents or
+        As `checked_model` and `load_model`, or if the nodes whose names begin with `depth/` need latents or
         make other than float32, int32 or int64.
     """
-    _, family = checked_model(contents, name)
-    placed, model = checked_model(at_depth(contents, depth_m, surface, name), name)
-    _, model, _ = load_model(placed, model, "cpu")
+    placed, family = checked_model(contents, name, depth_m, surface)
+    _, model, _ = load_model(placed, family, "cpu")
     rate, uncertainty = model.rate_hz_per_m2, model.rate_uncertainty_hz_per_m2
     said = {
         "depth_min_m": None,
         "depth_max_m": None,
+        "knots_m": None,
         "surface": str(model.surface),
         "rate_hz_per_m2": None if rate is None else repr(rate),
         "rate_uncertainty_hz_per_m2": None if uncertainty is None else repr(uncertainty),

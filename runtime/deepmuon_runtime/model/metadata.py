@@ -22,8 +22,10 @@ __all__ = [
     "LARGEST_DRAW",
     "LATENTS_PER_MUON",
     "METADATA_PREFIX",
+    "RATE_DIGITS",
     "SPHERE",
     "Model",
+    "are_one_rate",
     "is_name",
     "is_rate",
 ]
@@ -211,6 +213,15 @@ _OPTIONAL = {
     "rate_uncertainty_hz_per_m2": _NOT_NEGATIVE,
     "rate_relative_uncertainty": _NOT_NEGATIVE,
 }
+
+
+RATE_DIGITS = 5
+"""Of a rate that a graph gives in float32, whose last digits go with the type of CPU."""
+
+
+def are_one_rate(rate: float, other: float) -> bool:
+    """Tell whether two numbers are the rate of one model, but for its rounding."""
+    return math.isclose(rate, other, rel_tol=10 ** (1 - RATE_DIGITS))
 
 
 def is_rate(rate: float) -> bool:

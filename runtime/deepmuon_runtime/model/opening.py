@@ -14,16 +14,12 @@ from deepmuon_runtime.errors import RefusedError, first_line
 from deepmuon_runtime.model.contract import INPUT, RATE, check_signature
 from deepmuon_runtime.model.device import open_session
 from deepmuon_runtime.model.family import at_depth, read_model
-from deepmuon_runtime.model.metadata import Model, is_rate
+from deepmuon_runtime.model.metadata import RATE_DIGITS, Model, are_one_rate, is_rate
 from deepmuon_runtime.model.onnx_file import check_onnx_file
 
-__all__ = ["RATE_DIGITS", "RATE_ROUNDING", "checked_model", "load_model", "read_file"]
+__all__ = ["checked_model", "load_model", "read_file"]
 
 LARGEST_MODEL = 2**31 - 1  # bytes: the limit of protobuf, and so of an ONNX file without external data
-
-RATE_DIGITS = 6
-"""Of a rate that the graph gives in float32: the next one differs from a type of CPU to another."""
-RATE_ROUNDING = 1e-5  # relative, of two such rates
 
 
 def read_file(path: Path) -> bytes:
@@ -45,7 +41,9 @@ def read_file(path: Path) -> bytes:
         raise RefusedError(f"the model {path} can't be read: {reason}") from error
 
 
-def checked_model(contents: bytes, name: str, depth_m: float | None = None) -> tuple[bytes, Model]:
+def checked_model(
+    contents: bytes, name: str, depth_m: float | None = None, surface: int | None = None
+) -> tuple[bytes, Model]:
     """Look through a model file before ONNX Runtime sees it, and write the wanted depth into it if it is a family.
 
     Parameters
@@ -54,8 +52,8 @@ def checked_model(contents: bytes, name: str, depth_m: float | None = None) -> t
         An ONNX file.
     name
         What to call it in an error.
-    depth_m
-        Of a family, the wanted depth; the one that stands in it if left out.
+    depth_m, surface
+        Of a family, the wanted ones, as for `at_depth`; those that stand in it if left out.
 
     Returns
     -------
@@ -68,9 +66,10 @@ def checked_model(contents: bytes, name: str, depth_m: float | None = None) -> t
     """
     check_onnx_file(contents, name)
     shipped = read_model(contents, name)
-    if depth_m is None and not shipped.is_family:
+    if depth_m is None and surface is None and not shipped.is_family:
         return contents, shipped
-    contents = at_depth(contents, shipped.depth_m if depth_m is None else depth_m, shipped.surface, name)
+    depth_m = shipped.depth_m if depth_m is None else depth_m
+    contents = at_depth(contents, depth_m, shipped.surface if surface is None else surface, name)
     return contents, replace(read_model(contents, name), sha256=shipped.sha256, size=shipped.size)
 
 
@@ -112,7 +111,7 @@ def _with_rate(session: onnxruntime.InferenceSession, model: Model) -> Model:
             f"{model.name} breaks the contract: its rate at {model.depth_m:g} m is {given}, and should be positive"
         )
     if model.rate_hz_per_m2 is not None:
-        if not math.isclose(rate, model.rate_hz_per_m2, rel_tol=RATE_ROUNDING):
+        if not are_one_rate(rate, model.rate_hz_per_m2):
             raise RefusedError(
                 f"{model.name} breaks the contract: its rate is {rate:g}, and {model.rate_hz_per_m2:g} in its metadata"
             )

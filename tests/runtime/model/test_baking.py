@@ -70,7 +70,7 @@ def test_its_bytes_are_the_same_each_time_and_from_whatever_depth_the_family_had
 def test_a_sphere_is_baked_too(tmp_path: Path):
     model = opened(tmp_path, bake(tiny_family(), 13.7, 1)).model
     assert (model.surface, model.metadata["surface"]) == (1, "1")
-    assert model.rate_hz_per_m2 == pytest.approx(112.736, rel=1e-5)  # between 150 and 14 at 27.4 %
+    assert model.rate_hz_per_m2 == pytest.approx(112.736, rel=1e-4)  # between 150 and 14 at 27.4 %
 
 
 def left_after_loading(contents: bytes, folder: Path) -> list[tuple[str, ...]]:
@@ -88,7 +88,7 @@ def test_nothing_of_the_depth_is_left_in_what_onnx_runtime_runs(tmp_path: Path, 
     family = left_after_loading(at_depth(tiny_family(), depth), tmp_path)
     baked = left_after_loading(bake(tiny_family(), depth), tmp_path)
     assert family == baked
-    assert not {"MatMul", "Abs", "Relu", "Div", "Resize"} & {operator for operator, _ in family}
+    assert not {"MatMul", "Abs", "Relu", "Div", "Reshape"} & {operator for operator, _ in family}
 
 
 def test_a_model_of_one_depth_can_not_be_baked():

@@ -25,13 +25,6 @@ from deepmuon_runtime.model.opening import checked_model, load_model
 depths = st.floats(0, 100, width=32)
 
 
-@pytest.fixture
-def family_file(tmp_path: Path) -> Path:
-    path = tmp_path / "family.onnx"
-    path.write_bytes(tiny_family())
-    return path
-
-
 def refusal(contents: bytes, depth: Any = 10, surface: Any = 0) -> str:
     with pytest.raises(RefusedError) as refused:
         at_depth(contents, depth, surface, "family.onnx")
@@ -111,10 +104,10 @@ def test_the_muons_of_a_depth_are_those_of_its_interpolated_maps(family_file: Pa
 @pytest.mark.parametrize("depth", [0, 13.7, 100])
 def test_the_rate_is_that_of_the_depth_with_its_relative_uncertainty(family_file: Path, depth: float):
     model = Generator.open(depth, file=family_file).model
-    assert model.rate_hz_per_m2 == pytest.approx(tiny_rate(depth), rel=1e-5)
+    assert model.rate_hz_per_m2 == pytest.approx(tiny_rate(depth), rel=1e-4)
     assert model.rate_uncertainty_hz_per_m2 == pytest.approx(0.002 * tiny_rate(depth), rel=1e-2)
     _, sphere, _ = load_model(*checked_model(at_depth(family_file.read_bytes(), depth, 1), "a family"), "cpu")
-    assert sphere.rate_hz_per_m2 == pytest.approx(tiny_rate(depth, 1), rel=1e-5)
+    assert sphere.rate_hz_per_m2 == pytest.approx(tiny_rate(depth, 1), rel=1e-4)
 
 
 def test_a_family_loaded_as_it_is_is_a_model_of_its_default_depth(family_file: Path):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from support.engines import reference_evaluator
 
 from deepmuon_training.export.graph import Graph
-from deepmuon_training.families.knots import Knots, column_density_graph, risen_graph
+from deepmuon_training.families.knots import Knots, column_density_graph, risen, risen_graph
 
 DEPTHS = [0, 0.1, 0.3, 1, 3, 6, 10, 20, 30, 40, 50, 70, 100]
 SOME_DEPTHS = st.lists(st.floats(0, 5000, width=32), min_size=2, max_size=12, unique_by=lambda z: round(z, 1))
@@ -59,11 +59,14 @@ def test_the_four_nearest_knots_count():
     assert Knots(DEPTHS, 1.0).weights(99.0)[0].tolist() == [9, 10, 11, 12]
 
 
-@pytest.mark.parametrize("length", [1, 2, 3, 129])
-def test_a_running_maximum_is_one(length):
+@pytest.mark.parametrize("length", [3, 5, 129, 2177])
+def test_rows_rise_from_the_middle_on_where_they_did_not(length):
     table = np.random.default_rng(1).normal(size=(3, length)).astype(np.float32)
     g = Graph()
-    risen = risen_graph(g, g("Mul", "table", 1.0), length)
-    model = g.model({"table": [3, length]}, {"risen": (risen, 1, [3, length])}, {})
+    name = risen_graph(g, g("Mul", "table", 1.0), length)
+    model = g.model({"table": [3, length]}, {"risen": (name, 1, [3, length])}, {})
     (found,) = reference_evaluator(model).run(None, {"table": table})
-    np.testing.assert_array_equal(found, np.maximum.accumulate(table, axis=1))
+    np.testing.assert_array_equal(found, risen(table))
+    assert np.all(np.diff(found, axis=1) >= 0)
+    np.testing.assert_array_equal(found[:, length // 2], table[:, length // 2])
+    np.testing.assert_array_equal(risen(found), found)

@@ -12,6 +12,7 @@ ln 1, exactly 0 in every runtime, and all weights but one are 0.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from onnx import TensorProto
 from deepmuon_training.export.graph import Graph
 from deepmuon_training.export.graph_steps import END, cut
 
-__all__ = ["OFFSET", "Knots", "column_density", "column_density_graph", "interval", "risen_graph"]
+__all__ = ["OFFSET", "Knots", "column_density", "column_density_graph", "interval", "risen", "risen_graph"]
 
 OFFSET = 0.7
 """Metres of water in s."""
@@ -45,17 +46,32 @@ def interval(g: Graph, knots: str, x: str, last: int) -> str:
     return g("Clip", g("Sub", g("ReduceSum", below, np.array([0], dtype=np.int64), keepdims=0), 1.0), 0.0, float(last))
 
 
-def risen_graph(g: Graph, table: str, length: int) -> str:
-    """Return the running maximum of a matrix [m, length] along its rows: ONNX has no operator for it.
+def risen(table: NDArray[Any]) -> NDArray[Any]:
+    """Return a matrix [m, n] whose rows rise from both ends of the middle column: tails follow the bulk.
 
-    The maximum of a number and of that k places before it, for k = 1, 2, 4, ...
+    Where interpolation lets a row fall, few muons are: to the right of the middle it takes the largest value from there
+    on, to the left the smallest. From the left end on, it would lift the bulk to whatever is wrong in a tail.
     """
+    middle = table.shape[1] // 2
+    left = np.minimum.accumulate(table[:, middle::-1], axis=1)[:, ::-1]
+    right = np.maximum.accumulate(table[:, middle:], axis=1)
+    return np.concatenate([left[:, :-1], right], axis=1)
+
+
+def risen_graph(g: Graph, table: str, length: int) -> str:
+    """Build the same in ONNX, which has no operator for a running maximum.
+
+    It is that of a number and of those k places before it, for k = 1, 2, 4, ...
+    """
+    middle = length // 2
+    left, right = cut(g, table, 1, 0, middle + 1), cut(g, table, 1, middle, END)
     shift = 1
-    while shift < length:
-        later = g("Max", cut(g, table, 1, shift, END), cut(g, table, 1, 0, -shift))
-        table = g("Concat", cut(g, table, 1, 0, shift), later, axis=1)
+    while shift <= middle:
+        left_end, right_end = cut(g, left, 1, -shift, END), cut(g, right, 1, 0, shift)
+        left = g("Concat", g("Min", cut(g, left, 1, 0, -shift), cut(g, left, 1, shift, END)), left_end, axis=1)
+        right = g("Concat", right_end, g("Max", cut(g, right, 1, shift, END), cut(g, right, 1, 0, -shift)), axis=1)
         shift *= 2
-    return table
+    return g("Concat", cut(g, left, 1, 0, -1), right, axis=1)
 
 
 class Knots:

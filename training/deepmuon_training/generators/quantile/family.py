@@ -16,7 +16,7 @@ from onnx import TensorProto
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_training.export.graph import Graph
-from deepmuon_training.families.knots import Knots, column_density_graph, risen_graph
+from deepmuon_training.families.knots import Knots, column_density_graph, risen, risen_graph
 from deepmuon_training.families.rates import KnownRate, Rates
 from deepmuon_training.families.sphere import TriangularMap, through_sphere
 from deepmuon_training.generators.quantile.cells import column_logits, energy_logits, row_logits, row_place
@@ -88,8 +88,8 @@ class QuantileFamily:
         )
         return replace(
             like,
-            energy=np.maximum.accumulate(energy),
-            zenith=np.maximum.accumulate(zenith, axis=1),
+            energy=risen(energy[None])[0],
+            zenith=risen(zenith),
             charge=np.clip(charge, -1, 1),
             energy_range=self.energy_range,
         )
