@@ -146,7 +146,7 @@ def first_unphysical(
     if not faults:
         return None
     found = [(int(np.argmax(bad)), fault) for fault, bad in faults.items()]
-    index, fault = min(found, key=lambda first: first[0])
+    index, fault = min(found, key=lambda first: (first[0], first[1].value))
     return index, f"{explain(fault, energy_min_gev, energy_max_gev)} ({describe(muons, index)})"
 
 

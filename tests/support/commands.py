@@ -22,10 +22,16 @@ def command_line(command: str, *words: object) -> list[str]:
 
 
 def answers_signals(process: subprocess.Popen[str]) -> bool:
-    """Tell whether the command, and no longer Python, answers signals, or has ended."""
-    status = Path(f"/proc/{process.pid}/status").read_text()
-    caught = next((int(line.split()[1], 16) for line in status.splitlines() if line.startswith("SigCgt")), -1)
-    return bool(caught >> (signal.SIGHUP - 1) & 1)  # the last one that it takes over
+    """Tell whether the command, and no longer Python, answers signals, or has ended.
+
+    SIGHUP is the last one that it takes over, unless it was ignored from the start, as under nohup.
+    """
+    if process.poll() is not None:
+        return True
+    lines = (line.partition(":") for line in Path(f"/proc/{process.pid}/status").read_text().splitlines())
+    masks = {name: int(mask, 16) for name, _, mask in lines if name in ("SigCgt", "SigIgn")}
+    caught, ignored = ({n for n in signal.Signals if masks[name] >> (n - 1) & 1} for name in ("SigCgt", "SigIgn"))
+    return signal.SIGHUP in caught or (signal.SIGHUP in ignored and signal.SIGTERM in caught)
 
 
 def wait_for_answers(process: subprocess.Popen[str]) -> None:

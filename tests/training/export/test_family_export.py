@@ -120,7 +120,8 @@ def test_what_depends_on_the_depth_is_gone_once_the_file_is_loaded(file, family,
 
 def openvino_muons(contents: bytes) -> list[np.ndarray]:
     openvino = pytest.importorskip("openvino")
-    model = openvino.compile_model(contents, "CPU", {"INFERENCE_PRECISION_HINT": "f32"})
+    core = openvino.Core()
+    model = core.compile_model(core.read_model(contents), "CPU", {"INFERENCE_PRECISION_HINT": "f32"})
     found = model({"latent": LATENT})
     return [found[name] for name in OUTPUTS]
 
