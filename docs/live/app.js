@@ -19,7 +19,7 @@ const bar = element("progress", HTMLProgressElement);
 const status = element("status", HTMLElement);
 const problem = element("error", HTMLElement);
 
-const PREVIEW = 1 << 16; // muons of a spectrum that moves with the slider
+const PREVIEW = 1 << 15; // muons of a spectrum that moves with the slider
 const PREVIEW_SEED = 1n;
 
 class App {

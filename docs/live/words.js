@@ -56,9 +56,9 @@ function units(number, [unit, size]) {
  */
 export function readDepth(text, least, most) {
     const digits = text.trim().replace(/\s*m$/, "");
-    const depth = /^\d+(\.\d*)?$|^\.\d+$/.test(digits) ? Math.fround(Number(digits)) : Number.NaN;
+    const depth = /^\d+(\.\d*)?$|^\.\d+$/.test(digits) ? Number(digits) : Number.NaN;
     if (!(depth >= least && depth <= most)) throw new RangeError(`How deep? From ${least} to ${most} m, such as 13.7.`);
-    return Number(digits);
+    return depth;
 }
 
 /**

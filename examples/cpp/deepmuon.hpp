@@ -49,7 +49,8 @@ public:
 
     // A family at any depth in its range, in metres of its medium.
     Generator(const std::string& model, float depth) : Generator(model, at_depth(read_file(model), depth)) {
-        if (!(number("depth_min_m") <= depth && depth <= number("depth_max_m"))) {
+        const auto least = static_cast<float>(number("depth_min_m")), most = static_cast<float>(number("depth_max_m"));
+        if (!(least <= depth && depth <= most)) {
             throw std::runtime_error(model + " has depths from " + metadata("depth_min_m") + " to " +
                                      metadata("depth_max_m") + " m, and not " + text(depth));
         }

@@ -149,10 +149,12 @@ class Model:
         return f"{self.depth_min_m:g} to {self.depth_max_m:g}" if self.is_family else f"{self.depth_m:g}"
 
     def has_depth(self, depth_m: float) -> bool:
-        """Tell whether the file has the muons of a depth."""
+        """Tell whether the file has the muons of a depth; of a family depths are float32."""
         if self.depth_min_m is None or self.depth_max_m is None:
             return depth_m == self.depth_m
-        return self.depth_min_m <= depth_m <= self.depth_max_m
+        with np.errstate(over="ignore"):
+            least, depth, most = np.array([self.depth_min_m, depth_m, self.depth_max_m], np.float32)
+        return bool(least <= depth <= most)
 
     @property
     def stream(self) -> int:

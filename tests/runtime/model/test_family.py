@@ -137,6 +137,13 @@ def test_two_depths_have_streams_of_their_own_and_so_have_two_surfaces(family_fi
     assert len(streams) == 6
 
 
+@pytest.mark.parametrize("depth", [np.float32(0.3), 0.3, 0.1, np.float32(0.1)])
+def test_the_ends_of_the_range_belong_to_it_as_float32(depth):
+    said = {"depth_min_m": "0.1", "depth_max_m": "0.3", "depth_m": "0.2"}
+    family = tiny_family(said, changes={"depth_m": np.float32(0.2)})
+    assert texts(at_depth(family, depth))["deepmuon.depth_m"] in ("0.1", "0.3")
+
+
 @pytest.mark.parametrize("depth", [-0.1, 100.1, float("nan"), float("inf"), -1e300, 1e300])
 def test_a_depth_outside_is_refused_with_the_range(depth):
     assert refusal(tiny_family(), depth).endswith("in family.onnx: there are those from 0 to 100 m")
