@@ -90,6 +90,7 @@ def _training(known: dict[str, str]) -> Training:
         smoothed={"true": True, "false": False}.get(known.get("training_smoothed", "")),
         muons=int(known["training_muons"]),
         seed=int(known["training_seed"]),
+        flux="cry",
     )
 
 

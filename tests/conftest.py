@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from support.tiny_families import tiny_family
 from support.tiny_models import release, tiny_model
 
 # Some tests are about signals that they and all their children would ignore when started in the background of
@@ -23,15 +24,33 @@ def model_file(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
+def family_file(tmp_path: Path) -> Path:
+    """A family of any depth from 0 to 100 m."""
+    path = tmp_path / "family.onnx"
+    path.write_bytes(tiny_family())
+    return path
+
+
+@pytest.fixture
 def released(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder on Python's path with a package of small released models, in place of the real one."""
-    folder = tmp_path / "released"
+    yield from _in_place_of_the_released(tmp_path / "released", monkeypatch, {})
+
+
+@pytest.fixture
+def released_family(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The same with a family among them, whose architecture has models of one depth too."""
+    yield from _in_place_of_the_released(tmp_path / "released", monkeypatch, {"quantile-water.onnx": tiny_family()})
+
+
+def _in_place_of_the_released(folder: Path, monkeypatch: pytest.MonkeyPatch, more: dict[str, bytes]) -> Iterator[Path]:
     release(
         folder,
         {
             "quantile-0m.onnx": tiny_model(metadata={"depth_m": "0.0", "rate_hz_per_m2": "110.0"}),
             "quantile-10m.onnx": tiny_model(),
             "transformer-10m.onnx": tiny_model(8, {"architecture": "transformer"}),
+            **more,
         },
     )
     monkeypatch.delitem(sys.modules, "deepmuon_models", raising=False)

@@ -84,7 +84,7 @@ RECORDED = ("depth", "architecture", "number", "live_time", "area", "seed", "sha
     type=metres,
     metavar="METRES",
     shell_complete=depths,
-    help="Metres of water above the muons (see --list).",
+    help="Metres of water above the muons: any number in the range of a family (see --list).",
 )
 @click.option(
     "--architecture",
@@ -92,7 +92,7 @@ RECORDED = ("depth", "architecture", "number", "live_time", "area", "seed", "sha
     shell_complete=architectures,
     help="quantile or transformer; the better one if left out.",
 )
-@click.option("--model", type=FILE, metavar="FILE", help="Your own ONNX model, instead of --depth.")
+@click.option("--model", type=FILE, metavar="FILE", help="Your own ONNX model; of a family with --depth.")
 @click.option("-n", "--number", type=muon_number, metavar="NUMBER", help="How many muons: 1e7, 10_000_000.")
 @click.option(
     "--live-time",
@@ -181,7 +181,8 @@ def gen(
         _print_models()
         return
     _check_model_options(depth, architecture, model)
-    _check_released(depth, architecture)
+    if model is None:
+        _check_released(depth, architecture)
     _check_number_options(number, live_time, area)
     if shard is not None and seed is None:
         raise click.UsageError("--shard needs a --seed, the same for all shards: without it each would have its own")
@@ -218,8 +219,8 @@ def main() -> NoReturn:
 def _check_model_options(depth: float | None, architecture: str | None, model: Path | None) -> None:
     if depth is None and model is None:
         raise click.UsageError("which muons? Give --depth METRES (--list shows the depths there are), or --model FILE")
-    if model is not None and (depth is not None or architecture is not None):
-        raise click.UsageError("--model goes without --depth and --architecture: the file has its own")
+    if model is not None and architecture is not None:
+        raise click.UsageError("--model goes without --architecture: the file has its own")
 
 
 def _check_released(depth: float | None, architecture: str | None) -> None:
@@ -257,8 +258,9 @@ def _print_models() -> None:
     for model in list_models():
         mark = "*" if model.architecture == default else " "
         rate = "unknown" if model.rate_hz_per_m2 is None else f"{model.rate_hz_per_m2:.2f}"
+        rate = "of the depth" if model.is_family else rate
         click.echo(
-            f"{model.architecture + mark:12} {model.depth_m:9g} {rate:>15} {model.muons_per_draw:12} "
+            f"{model.architecture + mark:12} {model.depths:>9} {rate:>15} {model.muons_per_draw:12} "
             f"{model.size / 1e3:9.0f}"
         )
     click.echo("* the default")

@@ -15,9 +15,14 @@ if TYPE_CHECKING:
     from types import FrameType
     from typing import NoReturn
 
-__all__ = ["check", "csv", "gen", "merge", "plot"]
+__all__ = ["bake", "check", "csv", "gen", "merge", "plot"]
 
 NAMES = {getattr(_signal, name): name for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(_signal, name)}
+
+
+def bake() -> NoReturn:
+    """Run `deepmuon-bake`."""
+    _start("bake")
 
 
 def check() -> NoReturn:

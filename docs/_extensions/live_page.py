@@ -12,18 +12,21 @@ import re
 import shutil
 from pathlib import Path
 
+import numpy as np
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.util import logging
 from sphinx.util.typing import ExtensionMetadata
 
-from deepmuon_runtime import Model, list_models
+from deepmuon_runtime import Generator, Model, list_models
 from deepmuon_runtime.model.released import default_architecture, read_released
 
 __all__ = ["setup"]
 
 PAGE = "live"
 LINKED_FILE = re.compile(r'(?:href|src)="(\.\./_static/[^"#]+)"')
+OFFSET = 0.7  # m, as in models.js
+RATES = 65
 MODEL_FIELDS = (
     "name",
     "sha256",
@@ -31,6 +34,8 @@ MODEL_FIELDS = (
     "flux",
     "medium",
     "depth_m",
+    "depth_min_m",
+    "depth_max_m",
     "muons_per_draw",
     "latent_size",
     "energy_min_gev",
@@ -73,11 +78,21 @@ def write_models(evaluations: Path, target: Path) -> None:
 
 def describe(model: Model, evaluations: Path) -> dict[str, object]:
     """Return what the page needs to know of a model: docs/live/models.js has it in words."""
-    if model.rate_hz_per_m2 is None:
+    if model.rate_hz_per_m2 is None and not model.is_family:
         raise ExtensionError(f"the live page needs the rate of {model.name}, which does not know it")
     evaluation = evaluations / f"{Path(model.name).stem}.json"
     held_out = read_held_out(evaluation) if evaluation.exists() else None
-    return {field: getattr(model, field) for field in MODEL_FIELDS} | {"held_out": held_out}
+    return {field: getattr(model, field) for field in MODEL_FIELDS} | {"held_out": held_out, "rates": read_rates(model)}
+
+
+def read_rates(model: Model) -> list[tuple[float, float | None]] | None:
+    """Return the rates of a family at depths close enough to interpolate between, or None if it is none."""
+    if model.depth_min_m is None or model.depth_max_m is None:
+        return None
+    least, most = np.log([model.depth_min_m + OFFSET, model.depth_max_m + OFFSET])
+    between = np.exp(np.linspace(least, most, RATES)) - OFFSET
+    depths = [model.depth_min_m, *between[1:-1].tolist(), model.depth_max_m]
+    return [(depth, Generator.open(depth, model.architecture).model.rate_hz_per_m2) for depth in depths]
 
 
 def read_held_out(evaluation: Path) -> dict[str, list[int]]:

@@ -27,9 +27,10 @@ class ReleasedModels(SphinxDirective):
 
 def _row(model: Model) -> str:
     rate, uncertainty = model.rate_hz_per_m2, model.rate_uncertainty_hz_per_m2
-    texts = [f"{rate:.2f}" if rate else "unknown", f" ± {uncertainty:.2f}" if uncertainty else ""]
+    unknown = "of the depth" if model.is_family else "unknown"
+    texts = [f"{rate:.2f}" if rate else unknown, f" ± {uncertainty:.2f}" if uncertainty else ""]
     return (
-        f"| {model.architecture} | {model.depth_m:g} m | {''.join(texts)} | {model.muons_per_draw} "
+        f"| {model.architecture} | {model.depths} m | {''.join(texts)} | {model.muons_per_draw} "
         f"| `{model.name}` | {model.size / 1e3:.0f} kB |"
     )
 

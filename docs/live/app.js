@@ -19,13 +19,24 @@ const bar = element("progress", HTMLProgressElement);
 const status = element("status", HTMLElement);
 const problem = element("error", HTMLElement);
 
+const PREVIEW = 1 << 15; // muons of a spectrum that moves with the slider
+const PREVIEW_SEED = 1n;
+
 class App {
     /** @param {import("./models.js").Released} released */
     constructor(released) {
         this.results = new Results();
-        this.choices = new Choices(released, () => this.pick());
+        this.choices = new Choices(
+            released,
+            () => this.pick(),
+            () => this.follow(),
+        );
         this.engine = new Engine();
         this.stopped = false;
+        this.picks = 0;
+        this.isBehind = false; // the spectrum, of the slider
+        /** @type {Promise<void> | undefined} */
+        this.following = undefined;
         this.blocks = 0; // that the worker keeps
         this.fileName = "";
         form.onsubmit = (event) => {
@@ -43,10 +54,43 @@ class App {
 
     /** Another model is picked, and there are no muons of it. */
     pick() {
+        this.picks += 1;
         this.blocks = 0;
         saveButton.disabled = true;
         status.textContent = "";
         this.results.begin(this.choices.model, this.choices.surface);
+    }
+
+    /** The slider moves, and the spectrum with it. */
+    follow() {
+        this.blocks = 0;
+        saveButton.disabled = true;
+        this.isBehind = true;
+        this.following ??= this.catchUp().finally(() => {
+            this.following = undefined;
+        });
+    }
+
+    /** Show few muons of the depth where the slider is, until it rests. */
+    async catchUp() {
+        try {
+            while (this.isBehind) {
+                this.isBehind = false;
+                const { picks } = this;
+                const { model, surface } = this.choices;
+                await this.engine.ask("open", model);
+                await this.engine.ask("start", PREVIEW, PREVIEW_SEED);
+                const begun = performance.now();
+                let progress = await this.engine.ask("more");
+                while (progress.tally.count < PREVIEW) progress = await this.engine.ask("more");
+                if (picks !== this.picks) continue; // another model was picked
+                this.results.begin(model, surface);
+                this.results.show(progress, model, surface, (performance.now() - begun) / 1000);
+                status.textContent = `The spectrum ${place(model.depth_m)}, of ${count(PREVIEW)} muons.`;
+            }
+        } catch (error) {
+            this.fail(error);
+        }
     }
 
     generate() {
@@ -56,6 +100,8 @@ class App {
         const { surface } = this.choices;
         this.pick();
         this.work(async () => {
+            this.isBehind = false;
+            await this.following;
             status.textContent = `Getting the ${model.architecture} model ready …`;
             await this.engine.ask("open", model);
             await this.engine.ask("start", number, seed);

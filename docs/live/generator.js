@@ -1,7 +1,9 @@
 /** A model, ready to give muons. Runs in the worker. */
 
+import { atDepth } from "./family.js";
 import { fetchFile } from "./fetch_file.js";
 import { Latents, modelStream } from "./latents.js";
+import { isFamily } from "./models.js";
 
 const ENGINE = new URL("engine/", import.meta.url);
 const MODELS = new URL("models/", import.meta.url);
@@ -27,10 +29,10 @@ export class Generator {
      */
     static async open(model) {
         const [ort, latents] = await Promise.all([openOnnxRuntime(), openLatents()]);
-        const bytes = await fetchBytes(new URL(model.name, MODELS), "The model");
-        await checkHash(bytes, model);
+        const bytes = await fetchModel(model);
         try {
-            const session = await ort.InferenceSession.create(bytes, { executionProviders: ["wasm"] });
+            const placed = isFamily(model) ? atDepth(bytes, model.depth_m) : new Uint8Array(bytes);
+            const session = await ort.InferenceSession.create(placed, { executionProviders: ["wasm"] });
             return new Generator(model, ort, session, latents);
         } catch (error) {
             throw new Error(`The model ${model.name} could not be opened: ${reason(error)}`);
@@ -83,6 +85,23 @@ function openOnnxRuntime() {
         return ort;
     })();
     return onnxRuntime;
+}
+
+/** @type {{sha256: string, bytes: ArrayBuffer} | undefined} */
+let lastModel;
+
+/**
+ * The file of a model; that of the last one is kept, of which another depth may be wanted.
+ *
+ * @param {import("./models.js").Model} model
+ */
+async function fetchModel(model) {
+    if (lastModel?.sha256 !== model.sha256) {
+        const bytes = await fetchBytes(new URL(model.name, MODELS), "The model");
+        await checkHash(bytes, model);
+        lastModel = { sha256: model.sha256, bytes };
+    }
+    return lastModel.bytes;
 }
 
 async function openLatents() {

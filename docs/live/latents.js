@@ -35,12 +35,12 @@ export function readSeed(text) {
 /**
  * The stream of a model's random numbers: the FNV-1a hash of what it says of itself, 0 to 2^64 - 1.
  *
- * @param {{architecture: string, flux: string, medium: string, depth_m: number}} model
+ * @param {{architecture: string, flux: string, medium: string, surface?: number, depth_m: number}} model
  */
-export function modelStream({ architecture, flux, medium, depth_m }) {
+export function modelStream({ architecture, flux, medium, surface = 0, depth_m }) {
     const depth = new Uint8Array(4);
     new DataView(depth.buffer).setFloat32(0, depth_m, true);
-    const text = new TextEncoder().encode(`${architecture}/${flux}/${medium}/0/`);
+    const text = new TextEncoder().encode(`${architecture}/${flux}/${medium}/${surface}/`);
     let stream = 0xcbf29ce484222325n;
     for (const byte of [...text, ...depth]) stream = BigInt.asUintN(64, (stream ^ BigInt(byte)) * 0x100000001b3n);
     return stream;

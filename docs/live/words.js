@@ -47,6 +47,21 @@ function units(number, [unit, size]) {
 }
 
 /**
+ * The depth that a reader typed, in metres.
+ *
+ * @param {string} text
+ * @param {number} least
+ * @param {number} most
+ * @throws {RangeError} in words, if it is none
+ */
+export function readDepth(text, least, most) {
+    const digits = text.trim().replace(/\s*m$/, "");
+    const depth = /^\d+(\.\d*)?$|^\.\d+$/.test(digits) ? Number(digits) : Number.NaN;
+    if (!(depth >= least && depth <= most)) throw new RangeError(`How deep? From ${least} to ${most} m, such as 13.7.`);
+    return depth;
+}
+
+/**
  * The number that a reader typed: 1000000, 1e6, 1M, 1,000,000 or 1_000_000. A comma is none of decimals: 1,5 is refused.
  *
  * @param {string} text

@@ -11,7 +11,8 @@ let run;
 const answers = {
     /** @param {import("./models.js").Model} model */
     async open(model) {
-        if (generator?.model.sha256 === model.sha256) return;
+        const now = generator?.model;
+        if (now?.sha256 === model.sha256 && now.depth_m === model.depth_m) return;
         const opened = await Generator.open(model);
         await generator?.close();
         generator = opened;

@@ -4,6 +4,8 @@
 //     deepmuon::Philox random = generator.random(1);
 //     for (const deepmuon::Muon& muon : generator.sample(1000, random)) { ... }
 //
+// Of a family, which has any depth in its range: Generator generator("family.onnx", 13.7f).
+//
 // These are the muons of `deepmuon-gen --seed 1`. Any other source of 32 random bits will do, such as a std::mt19937.
 //
 // OpenVINO runs the model where DEEPMUON_OPENVINO is defined, else ONNX Runtime. Errors are exceptions: what the engine
@@ -14,13 +16,15 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <map>
+#include <iomanip>
 #include <locale>
+#include <map>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "family.hpp"
 #include "muon.hpp"
 #include "philox.hpp"
 #include "stream.hpp"
@@ -40,16 +44,20 @@ inline float latent(std::uint32_t bits) {
 
 class Generator {
 public:
-    explicit Generator(const std::string& model) : engine_(model), model_(model), metadata_(engine_.metadata()) {
-        if (metadata("contract_version") != "1") {
-            throw std::runtime_error(model + " keeps version " + metadata("contract_version") +
-                                     " of the contract, and this program reads version 1");
+    // A model of one depth, or a family at the depth that stands in it.
+    explicit Generator(const std::string& model) : Generator(model, read_file(model)) {}
+
+    // A family at any depth in its range, in metres of its medium.
+    Generator(const std::string& model, float depth) : Generator(model, at_depth(read_file(model), depth)) {
+        const auto least = static_cast<float>(number("depth_min_m")), most = static_cast<float>(number("depth_max_m"));
+        if (!(least <= depth && depth <= most)) {
+            throw std::runtime_error(model + " has depths from " + metadata("depth_min_m") + " to " +
+                                     metadata("depth_max_m") + " m, and not " + text(depth));
         }
-        latent_size_ = std::stoul(metadata("latent_size"));
-        muons_per_draw_ = std::stoul(metadata("muons_per_draw"));
+        metadata_["deepmuon.depth_m"] = text(depth);
     }
 
-    // What the model says of itself, such as metadata("rate_hz_per_m2"); docs/onnx_contract.md lists the keys.
+    // What the model says of itself at its depth, such as metadata("rate_hz_per_m2"); docs/onnx_contract.md lists the keys.
     const std::string& metadata(const std::string& key) const {
         const auto found = metadata_.find("deepmuon." + key);
         if (found == metadata_.end()) {
@@ -63,11 +71,9 @@ public:
     Philox random(std::uint64_t seed) const {
         const auto found = metadata_.find("deepmuon.flux");
         const std::string flux = found != metadata_.end() ? found->second : creator(metadata("created_by"));
-        double depth = 0;
-        std::istringstream text(metadata("depth_m"));
-        text.imbue(std::locale::classic());
-        text >> depth;
-        return {seed, model_stream(metadata("architecture"), flux, metadata("medium"), static_cast<float>(depth))};
+        const std::string surface = metadata_.count("deepmuon.surface") ? metadata("surface") : "0";
+        const float depth = static_cast<float>(number("depth_m"));
+        return {seed, model_stream(metadata("architecture"), flux, metadata("medium"), surface, depth)};
     }
 
     std::size_t latent_size() const { return latent_size_; }
@@ -91,6 +97,47 @@ public:
     std::vector<Muon> run(std::vector<float>& latents) { return engine_.run(latents, latents.size() / latent_size_); }
 
 private:
+    Generator(const std::string& model, const std::string& contents)
+        : engine_(contents), model_(model), metadata_(engine_.metadata()) {
+        if (metadata("contract_version") != "1" && metadata("contract_version") != "2") {
+            throw std::runtime_error(model + " keeps version " + metadata("contract_version") +
+                                     " of the contract, and this program reads versions 1 and 2");
+        }
+        latent_size_ = std::stoul(metadata("latent_size"));
+        muons_per_draw_ = std::stoul(metadata("muons_per_draw"));
+        if (metadata_.count("deepmuon.depth_min_m") && engine_.has_rate()) { // a family's rate goes with the depth
+            std::vector<float> latents(latent_size_);
+            metadata_["deepmuon.rate_hz_per_m2"] = text(engine_.rate(latents));
+        }
+    }
+
+    double number(const std::string& key) const {
+        double number = 0;
+        std::istringstream text(metadata(key));
+        text.imbue(std::locale::classic());
+        text >> number;
+        return number;
+    }
+
+    // The shortest text of a number.
+    static std::string text(float number) {
+        std::string text;
+        for (int digits = 6; digits <= 9; ++digits) {
+            std::ostringstream stream;
+            stream.imbue(std::locale::classic());
+            stream << std::setprecision(digits) << number;
+            text = stream.str();
+            std::istringstream back(text);
+            back.imbue(std::locale::classic());
+            double read = 0;
+            back >> read;
+            if (static_cast<float>(read) == number) {
+                break;
+            }
+        }
+        return text;
+    }
+
     static constexpr std::size_t largest_run = 16384; // muons: what a processor's cache holds
 
     Engine engine_;

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -13,7 +15,8 @@ namespace deepmuon {
 // Runs a model in OpenVINO on the CPU, in one thread.
 class Engine {
 public:
-    explicit Engine(const std::string& model) : model_(core().read_model(model)) {
+    // Takes the contents of an ONNX file.
+    explicit Engine(const std::string& contents) : model_(core().read_model(contents, ov::Tensor())) {
         // float32 even where the processor has units for less: OpenVINO would take those.
         request_ = core()
                        .compile_model(model_, "CPU", ov::hint::inference_precision(ov::element::f32),
@@ -30,6 +33,18 @@ public:
             }
         }
         return metadata;
+    }
+
+    bool has_rate() const {
+        const auto outputs = model_->outputs();
+        return std::any_of(outputs.begin(), outputs.end(),
+                           [](const auto& output) { return output.get_names().count("rate_hz_per_m2") > 0; });
+    }
+
+    // Muons per second and m2, whatever the latents, which are those of one draw.
+    float rate(std::vector<float>& latent) {
+        run(latent, 1);
+        return *request_.get_tensor("rate_hz_per_m2").data<float>();
     }
 
     std::vector<Muon> run(std::vector<float>& latent, std::size_t draws) {

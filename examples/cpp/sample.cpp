@@ -1,9 +1,11 @@
-// deepmuon-sample MODEL N SEED: writes N muons as CSV, those of deepmuon-gen; what the model says of itself goes to the standard error.
+// deepmuon-sample MODEL N SEED [DEPTH]: writes N muons as CSV, those of deepmuon-gen; what the model says of itself goes to the standard error.
 
 #include <charconv>
 #include <cstdint>
 #include <cstdio>
 #include <exception>
+#include <locale>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 
@@ -20,16 +22,27 @@ std::uint64_t whole_number(const std::string& text) {
     return number;
 }
 
+float metres(const std::string& text) {
+    std::istringstream stream(text);
+    stream.imbue(std::locale::classic());
+    float depth = 0;
+    if (!(stream >> depth) || !stream.eof()) {
+        throw std::runtime_error(text + " is no number of metres");
+    }
+    return depth;
+}
+
 } // namespace
 
 int main(int argc, char** argv) try {
-    if (argc != 4) {
-        std::fprintf(stderr, "usage: deepmuon-sample MODEL N SEED > muons.csv\n");
+    if (argc != 4 && argc != 5) {
+        std::fprintf(stderr, "usage: deepmuon-sample MODEL N SEED [DEPTH] > muons.csv\n");
         return 2;
     }
     const std::uint64_t count = whole_number(argv[2]);
     const std::uint64_t seed = whole_number(argv[3]);
-    deepmuon::Generator generator(argv[1]);
+    deepmuon::Generator generator =
+        argc == 5 ? deepmuon::Generator(argv[1], metres(argv[4])) : deepmuon::Generator(argv[1]);
     std::fprintf(stderr, "%s, %s m of %s\n", generator.metadata("architecture").c_str(),
                  generator.metadata("depth_m").c_str(), generator.metadata("medium").c_str());
     std::printf("kinetic_energy,u,v,w,pdg_id\n");

@@ -9,8 +9,8 @@ namespace deepmuon {
 // The stream that keeps a model's random numbers apart from those of all others, the FNV-1a hash of what the model says
 // of itself: docs/random_numbers.md has it as a formula.
 inline std::uint64_t model_stream(const std::string& architecture, const std::string& flux, const std::string& medium,
-                                  float depth) {
-    std::string description = architecture + "/" + flux + "/" + medium + "/0/";
+                                  const std::string& surface, float depth) {
+    std::string description = architecture + "/" + flux + "/" + medium + "/" + surface + "/";
     std::uint32_t bits;
     static_assert(sizeof bits == sizeof depth, "a float is to have four bytes");
     std::memcpy(&bits, &depth, sizeof bits);

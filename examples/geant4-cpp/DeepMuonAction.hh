@@ -21,6 +21,10 @@ public:
     // The square has its centre at (0, 0, z). Muons come in at angles: one much larger than the detector loses none.
     DeepMuonAction(const std::string& model, G4double side, G4double z) : generator_(model), side_(side), z_(z) {}
 
+    // The same with a family, which has any depth in its range, in metres of its medium.
+    DeepMuonAction(const std::string& family, float depth, G4double side, G4double z)
+        : generator_(family, depth), side_(side), z_(z) {}
+
     // All randomness is Geant4's: an event that is run again with its seeds has its muon again.
     void GeneratePrimaries(G4Event* event) override {
         const auto random = [] { return static_cast<std::uint32_t>(G4UniformRand() * 0x1p32); };

@@ -1,7 +1,8 @@
-// exampleDeepMuon MODEL EVENTS: muons on a plate of plastic scintillator, 1 m x 1 m x 2 cm.
+// exampleDeepMuon MODEL EVENTS [DEPTH]: muons on a plate of plastic scintillator, 1 m x 1 m x 2 cm.
 
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "FTFP_BERT.hh"
@@ -65,9 +66,10 @@ private:
 
 class Actions : public G4VUserActionInitialization {
 public:
-    explicit Actions(const std::string& model) : model_(model) {}
+    Actions(const std::string& model, std::optional<float> depth) : model_(model), depth_(depth) {}
     void Build() const override {
-        SetUserAction(new DeepMuonAction(model_, 20 * m, 1 * m));
+        SetUserAction(depth_ ? new DeepMuonAction(model_, *depth_, 20 * m, 1 * m)
+                             : new DeepMuonAction(model_, 20 * m, 1 * m));
         auto* deposits = new Deposits;
         SetUserAction(deposits);
         SetUserAction(new Steps(*deposits));
@@ -75,17 +77,18 @@ public:
 
 private:
     std::string model_;
+    std::optional<float> depth_; // m, of a family
 };
 
 int main(int argc, char** argv) {
-    if (argc != 3) {
-        std::cerr << "usage: exampleDeepMuon MODEL EVENTS\n";
+    if (argc != 3 && argc != 4) {
+        std::cerr << "usage: exampleDeepMuon MODEL EVENTS [DEPTH]\n";
         return 2;
     }
     std::unique_ptr<G4RunManager> manager(G4RunManagerFactory::CreateRunManager(G4RunManagerType::Serial));
     manager->SetUserInitialization(new Plate);
     manager->SetUserInitialization(new FTFP_BERT);
-    manager->SetUserInitialization(new Actions(argv[1]));
+    manager->SetUserInitialization(new Actions(argv[1], argc == 4 ? std::optional(std::stof(argv[3])) : std::nullopt));
     manager->Initialize();
     manager->BeamOn(std::stoi(argv[2]));
 

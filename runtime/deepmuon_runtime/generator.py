@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import collections.abc
-import hashlib
 import os
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -20,7 +19,7 @@ from deepmuon_runtime.errors import FailedError, RefusedError, first_line
 from deepmuon_runtime.latents.philox import checked_seed, fill_latents, new_seed
 from deepmuon_runtime.latents.poisson import poisson
 from deepmuon_runtime.latents.shard import WHOLE_RUN, Shard
-from deepmuon_runtime.model.metadata import LATENTS_PER_MUON, Model
+from deepmuon_runtime.model.metadata import LATENTS_PER_MUON, SPHERE, Model
 from deepmuon_runtime.model.released import read_released, released_model
 from deepmuon_runtime.muon_file.format import BYTES_PER_MUON
 from deepmuon_runtime.muon_file.output import check_muon_output
@@ -44,7 +43,6 @@ LARGEST_NUMBER = 2**53
 BLOCK = {"cpu": 1 << 14, "cuda": 1 << 18}
 PIECE = {"cpu": 1 << 17, "cuda": 1 << 18}  # muons of one task of a thread, and of one write, in whole blocks
 TRIED = 5  # values of the latents, before the first muons: the ends, the middle, and two between
-LARGEST_MODEL = 2**31 - 1  # bytes: the limit of protobuf, and so of an ONNX file without external data
 
 Outputs = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int8]]  # energy, direction, charge
 
@@ -98,11 +96,12 @@ class Generator:
         Parameters
         ----------
         depth
-            Metres of water above the muons.
+            Metres of water above the muons. Of a family, any number in its range; that of a file has its medium, and
+            the depth that stands in it if left out.
         architecture
             "quantile" or "transformer"; the default one if left out.
         file
-            An ONNX file, instead of `depth` and `architecture`.
+            An ONNX file, instead of a released model.
         device
             "cpu"; "cuda"; or "auto", which is CUDA where it can be had, else the CPU.
         threads
@@ -111,31 +110,27 @@ class Generator:
         Raises
         ------
         RefusedError
-            If there is no such model, it breaks the contract, or the device can't be had.
+            If there is no such model or depth, it breaks the contract, or the device can't be had.
         """
-        from deepmuon_runtime.model.contract import check_signature, contract_metadata
-        from deepmuon_runtime.model.device import open_session
-        from deepmuon_runtime.model.onnx_file import check_onnx_file
+        from deepmuon_runtime.model.opening import checked_model, load_model, read_file
 
         threads = _usable_processors() if threads is None else threads
         if not isinstance(threads, Integral) or threads < 1:
             raise RefusedError(f"{threads!r} threads can't make muons: 1 or more can")
-        if file is None:
+        if file is not None:
+            if architecture is not None:
+                raise RefusedError("a model's file decides its architecture: give the file, and of a family a depth")
+            name, contents = str(file), read_file(Path(file))
+        else:
             if depth is None:
                 raise RefusedError("which model? Give the depth of a released one, or the file of another")
             released = released_model(depth, architecture)
-            name, content = released.name, read_released(released)
-        else:
-            if depth is not None or architecture is not None:
-                raise RefusedError("a model's file decides its depth and architecture: give the file alone")
-            name, content = str(file), _read_model(Path(file))
-        check_onnx_file(content, name)
+            name, contents = released.name, read_released(released)
+            depth = depth if released.is_family else None
+        contents, model = checked_model(contents, name, depth)
         if file is not None:
-            cls._try_memory(content, name)
-        session, device = open_session(content, name, device)
-        sha256 = hashlib.sha256(content).hexdigest()
-        model = Model.from_metadata(contract_metadata(session, name), name, sha256, len(content))
-        check_signature(session, model)
+            cls._try_memory(contents, model)
+        session, model, device = load_model(contents, model, device)
         generator = cls(session, model, device, threads)
         generator._try(TRIED)
         return generator
@@ -255,6 +250,8 @@ class Generator:
     def number_in_live_time(self, live_time: float, area: float, seed: int) -> int:
         """Draw the number of muons that cross a horizontal area: a Poisson number at the model's rate.
 
+        Of a model whose muons cross a sphere, the area is that of its cross-section.
+
         Parameters
         ----------
         live_time
@@ -298,6 +295,7 @@ class Generator:
             "architecture": model.architecture,
             "device": self.device,
             **{name: rate for name, rate in rates.items() if rate is not None},
+            **({"surface": model.surface} if model.surface == SPHERE else {}),
         }
 
     def _parts(self, numbers: range) -> Iterator[range]:
@@ -347,13 +345,12 @@ class Generator:
         np.multiply(charge[kept], np.int8(MU_PLUS), out=muons.pdg_id)
 
     @classmethod
-    def _try_memory(cls, content: bytes, name: str) -> None:
+    def _try_memory(cls, contents: bytes, model: Model) -> None:
         """Refuse a model of which a block of muons takes too much memory, before it is loaded for good."""
-        from deepmuon_runtime.model.contract import check_signature, contract_metadata
+        from deepmuon_runtime.model.contract import check_signature
         from deepmuon_runtime.model.trial import open_for_trial, returning_memory
 
-        session = open_for_trial(content, name)
-        model = Model.from_metadata(contract_metadata(session, name), name, "", len(content))
+        session = open_for_trial(contents, model.name)
         check_signature(session, model)
         generator = cls(session, model, "cpu", threads=1)
         for draws in (TRIED, generator._block_draws):
@@ -381,18 +378,6 @@ class Generator:
             check_physical(muons, self.model.energy_min_gev, self.model.energy_max_gev)
         except FailedError as error:
             raise RefusedError(f"{self.model.name} breaks the contract in a trial: {error}") from error
-
-
-def _read_model(path: Path) -> bytes:
-    if path.exists() and not path.is_file():
-        raise RefusedError(f"{path} is no ONNX file: it is a folder, a pipe or a device")
-    try:
-        if path.stat().st_size > LARGEST_MODEL:
-            raise RefusedError(f"{path} is no ONNX file: it is larger than 2 GB")
-        return path.read_bytes()
-    except (OSError, ValueError) as error:
-        reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else str(error)
-        raise RefusedError(f"the model {path} can't be read: {reason}") from error
 
 
 def _block_draws(model: Model, device: str) -> int:

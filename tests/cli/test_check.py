@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from support.muon_files import sign
 from support.thorough import TIMES
+from support.tiny_families import tiny_family
 from support.tiny_models import release, tiny_model
 
 from deepmuon_runtime import Generator, Muons, write_muons
@@ -31,7 +32,7 @@ LONGEST = 600  # s, on any machine
 def environment(tmp_path_factory):
     """Variables of a process for which the small model is a released one."""
     folder = tmp_path_factory.mktemp("released")
-    release(folder, {"quantile-10m.onnx": tiny_model()})
+    release(folder, {"quantile-10m.onnx": tiny_model(), "quantile-water.onnx": tiny_family()})
     others = filter(None, [os.environ.get("PYTHONPATH")])
     return {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), *others])}
 
@@ -87,6 +88,38 @@ def test_a_model_of_ones_own_is_no_defect_and_named_as_such(check, tmp_path):
     assert code == 0
     assert "  depth               12.5 m of G4_WATER" in lines
     assert any(line.startswith("  model               none of the released ones, SHA-256 ") for line in lines)
+
+
+@pytest.fixture
+def of_a_family(tmp_path, family_file) -> Path:
+    Generator.open(13.7, file=family_file, device="cpu").write(tmp_path / "family.h5", 100, seed=1)
+    return tmp_path / "family.h5"
+
+
+def test_muons_of_a_family_are_those_of_a_released_model_whatever_their_depth(check, of_a_family):
+    code, lines, _ = check(of_a_family)
+    assert code == 0
+    assert "  depth               13.7 m of water" in lines
+    assert "  rate                82.60 +- 0.17 per m2 and s" in lines
+    assert any(line.startswith("  model               the released quantile-water.onnx, SHA-256 ") for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "defect"),
+    [
+        ("depth_m", 100.5, "depth_m is 100.5, and its model quantile-water.onnx has 0 to 100"),
+        ("depth_m", 20.0, "rate_hz_per_m2 is 82.6, and that of its model quantile-water.onnx is 70.0"),
+        ("rate_hz_per_m2", 82.7, "rate_hz_per_m2 is 82.7, and that of its model quantile-water.onnx is 82.6"),
+        ("medium", "rock", "medium is 'rock', and that of its model quantile-water.onnx is 'water'"),
+    ],
+)
+def test_what_a_family_could_not_have_made_is_a_defect(check, of_a_family, name, value, defect):
+    with h5py.File(of_a_family, "r+") as file:
+        file["muons"].attrs[name] = value
+        sign(file["muons"])
+    code, lines, _ = check(of_a_family)
+    assert code == 3
+    assert f"the attribute {defect}" in defects(lines)
 
 
 def test_muons_of_other_origin_are_checked_too(check, tmp_path):

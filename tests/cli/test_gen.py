@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import hashlib
 import os
 import pty
 import re
@@ -211,6 +212,54 @@ def test_the_list_shows_every_model_and_the_default(gen):
     ]
 
 
+@pytest.mark.usefixtures("released_family")
+def test_the_list_shows_families_with_their_range(gen):
+    code, out, _ = gen("--list")
+    assert code == 0
+    assert re.search(r"^quantile\* +0 to 100 +of the depth +1 +\d+$", out, re.MULTILINE)
+    assert re.search(r"^quantile\* +10 +55\.50 ", out, re.MULTILINE)
+
+
+@pytest.mark.usefixtures("released_family")
+def test_any_depth_of_a_released_family_is_generated_and_recorded(gen):
+    code, out, err = gen("--depth", "13.7", "-n", "1000", "-o", "muons.h5", "--seed", 7)
+    assert (code, err) == (0, "")
+    assert f"equivalent live time {1000 / 82.6:.1f} s" in out
+    assert read_attributes("muons.h5")["depth_m"] == 13.7
+    assert read_attributes("muons.h5")["rate_hz_per_m2"] == 82.6
+    assert np.array_equal(
+        read_muons("muons.h5").kinetic_energy, Generator.open(13.7).sample(1000, seed=7).kinetic_energy
+    )
+
+
+@pytest.mark.usefixtures("released_family")
+def test_a_depth_beyond_all_models_is_refused_with_the_range(gen):
+    code, out, err = gen("--depth", "100.5", "-n", "1000", "-o", "muons.h5")
+    assert (code, out, files()) == (2, "", [])
+    assert "no quantile model for a depth of 100.5 m: there are 0 to 100, 0 and 10 m" in err
+
+
+def test_a_model_of_one_depth_takes_none(gen, model_file):
+    code, out, err = gen("--model", model_file, "--depth", "10", "-n", "10", "-o", "muons.h5")
+    assert (code, out, files()) == (2, "", [])
+    assert err == f"deepmuon-gen: {model_file} is no family: all its muons are of 10 m; give no depth with it\n"
+
+
+def test_a_family_of_ones_own_takes_a_depth(gen, family_file):
+    for name, options in (("muons.h5", ["--depth", "13.7"]), ("default.h5", [])):
+        code, _, err = gen("--model", family_file, *options, "-n", "1000", "-o", name)
+        assert (code, err) == (0, "")
+    assert read_attributes("muons.h5")["depth_m"] == 13.7
+    assert read_attributes("default.h5")["depth_m"] == 10
+    assert read_attributes("muons.h5")["model_sha256"] == hashlib.sha256(family_file.read_bytes()).hexdigest()
+
+
+def test_a_depth_that_a_family_of_ones_own_has_not_is_refused_with_the_range(gen, family_file):
+    code, out, err = gen("--model", family_file, "--depth", "-1", "-n", "10", "-o", "muons.h5")
+    assert (code, out, files()) == (2, "", [])
+    assert err == f"deepmuon-gen: no depth of -1 m in {family_file}: there are those from 0 to 100 m\n"
+
+
 def test_the_version_is_the_distributions(gen):
     code, out, _ = gen("--version")
     assert code == 0
@@ -291,7 +340,7 @@ GOOD = {"--depth": "10", "-n": "10", "-o": "muons.h5"}
         ({"--depth": "deep"}, "deep is no number of metres"),
         ({"--depth": None}, "which muons? Give --depth METRES"),
         ({"--architecture": "flow"}, "there are quantile and transformer"),
-        ({"--model": "model.onnx"}, "--model goes without --depth"),
+        ({"--model": "m.onnx", "--architecture": "quantile"}, "--model goes without --architecture"),
         ({"--depth": None, "--model": "missing.onnx"}, "No such file"),
         ({"--depth": None, "--model": "."}, "is no ONNX file"),
         ({"--device": "gpu"}, "there are auto, cpu, cuda"),

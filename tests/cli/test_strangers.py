@@ -11,6 +11,7 @@ import pytest
 from support.commands import endings
 from support.damage import DAMAGES, cut_out, overwrite, repeat, truncate
 from support.thorough import TIMES
+from support.tiny_families import tiny_family
 from support.tiny_models import tiny_model
 
 from deepmuon_runtime import Generator, Shard, check_file, list_models
@@ -23,7 +24,8 @@ SEED = 4
 def damaged_models(folder: Path, count: int, seed: int = SEED) -> list[Path]:
     """Write damaged models, each in a folder of its own."""
     random = np.random.default_rng(seed)
-    whole = [tiny_model(), tiny_model(8), *(read_released(model) for model in list_models() if model.depth_m == 0)]
+    released = [read_released(model) for model in list_models() if model.depth_m == 0]
+    whole = [tiny_model(), tiny_model(8), tiny_family(), *released]
     paths = []
     for number in range(count):
         content = DAMAGES[number % len(DAMAGES)](whole[random.integers(len(whole))], random)

@@ -14,8 +14,10 @@ from pathlib import Path
 import numpy as np
 import onnx
 import pytest
+from support.tiny_families import tiny_family
 
-from deepmuon_runtime import read_muons
+from deepmuon_runtime import Generator, read_muons
+from deepmuon_runtime.model.baking import bake
 
 REPOSITORY = Path(__file__).parents[2]
 MODELS = REPOSITORY / "models" / "deepmuon_models"
@@ -120,6 +122,82 @@ def test_a_seed_gives_the_muons_of_deepmuon_gen(readme: tuple[Path, str], tmp_pa
     np.testing.assert_allclose(found[:, 0], expected.kinetic_energy, rtol=1e-4)
     np.testing.assert_allclose(found[:, 1:4], np.transpose([expected.u, expected.v, expected.w]), atol=1e-5)
     assert np.sum(found[:, 4] != expected.pdg_id) <= 2
+
+
+def run_sample(folder: Path, *words: object) -> subprocess.CompletedProcess[str]:
+    program = folder / "build" / "cpp" / "deepmuon-sample"
+    return subprocess.run([program, *map(str, words)], capture_output=True, text=True)
+
+
+def muons_of(written: str) -> np.ndarray:
+    return np.array(list(csv.reader(written.splitlines()))[1:], dtype=float)
+
+
+@needs_openvino
+@pytest.mark.parametrize("raw", [True, False])
+@pytest.mark.parametrize("depth", [0, 0.1, 13.7, 100])
+def test_a_family_at_a_depth_gives_the_muons_of_python(readme: tuple[Path, str], tmp_path: Path, depth, raw):
+    family, baked, sphere = (tmp_path / f"{name}.onnx" for name in ("family", "baked", "sphere"))
+    family.write_bytes(tiny_family(raw=raw))
+    baked.write_bytes(bake(family.read_bytes(), depth))
+    sphere.write_bytes(bake(family.read_bytes(), depth, 1))
+    for words, generator in (
+        ([family, 1000, 7, depth], Generator.open(depth, file=family)),
+        ([baked, 1000, 7], Generator.open(depth, file=family)),
+        ([family, 1000, 7], Generator.open(file=family)),
+        ([sphere, 1000, 7], Generator.open(file=sphere)),
+    ):
+        done = run_sample(readme[0], *words)
+        assert f"quantile, {generator.model.depth_m:g} m of water" in done.stderr
+        found, expected = muons_of(done.stdout), generator.sample(1000, seed=7)
+        np.testing.assert_allclose(found[:, 0], expected.kinetic_energy, rtol=2e-5)
+        np.testing.assert_allclose(found[:, 1:4], np.transpose([expected.u, expected.v, expected.w]), atol=2e-6)
+        np.testing.assert_array_equal(found[:, 4], expected.pdg_id)
+
+
+@needs_openvino
+@pytest.mark.parametrize(
+    ("depth", "message"),
+    [
+        ("100.1", "has depths from 0 to 100 m, and not 100.1"),
+        ("-1", "has depths from 0 to 100 m, and not -1"),
+        ("deep", "deep is no number of metres"),
+    ],
+)
+def test_a_depth_that_a_family_has_not_is_told(readme: tuple[Path, str], family_file: Path, depth: str, message: str):
+    done = run_sample(readme[0], family_file, 10, 1, depth)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert message in done.stderr
+
+
+@needs_openvino
+def test_a_model_of_one_depth_takes_none(readme: tuple[Path, str]):
+    done = run_sample(readme[0], MODELS / "quantile-0m.onnx", 10, 1, 10)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "no family: there is no depth to be set" in done.stderr
+
+
+@needs_openvino
+def test_the_rate_of_a_family_goes_with_its_depth(readme: tuple[Path, str], tmp_path: Path, family_file: Path):
+    (tmp_path / "rate.cpp").write_text(
+        """#include <iostream>
+        #include "deepmuon.hpp"
+        int main(int, char** words) {
+            std::cout << deepmuon::Generator(words[1], 13.7f).metadata("rate_hz_per_m2") << " "
+                      << deepmuon::Generator(words[1]).metadata("rate_hz_per_m2") << "\\n";
+        }"""
+    )
+    (tmp_path / "CMakeLists.txt").write_text(
+        f"""cmake_minimum_required(VERSION 3.21)
+        project(rate CXX)
+        add_subdirectory({REPOSITORY / "examples" / "cpp"} deepmuon)
+        add_executable(rate rate.cpp)
+        target_link_libraries(rate PRIVATE deepmuon)"""
+    )
+    _, build = blocks(EMBEDDING, "sh")
+    shell(build[build.index("cmake -B") : build.index("build/my-muons")], tmp_path)
+    found = subprocess.run([tmp_path / "build" / "rate", family_file], stdout=subprocess.PIPE, text=True, check=True)
+    assert [float(word) for word in found.stdout.split()] == pytest.approx([82.6, 90], rel=1e-5)
 
 
 @needs_openvino

@@ -333,10 +333,10 @@ def test_no_threads_are_refused(model_file, threads):
         Generator.open(file=model_file, threads=threads)
 
 
-def test_a_model_is_named_by_depth_or_by_file_and_not_by_both(model_file):
+def test_a_model_is_named_by_depth_or_by_file_and_one_of_a_single_depth_not_by_both(model_file):
     with pytest.raises(RefusedError, match="which model"):
         Generator.open()
-    with pytest.raises(RefusedError, match="give the file alone"):
+    with pytest.raises(RefusedError, match="is no family"):
         Generator.open(10, file=model_file)
 
 

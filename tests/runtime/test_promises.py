@@ -99,3 +99,13 @@ def test_seeds_and_shards_share_no_muon(model):
     samples += [generator.sample(100_000, seed=0, first=first) for first in (100_000, 10**6, 10**12, 2**53 - 100_000)]
     together = np.concatenate([rows(muons) for muons in samples])
     assert len(np.unique(together)) == len(together) == 1_000_000
+
+
+def test_the_shards_of_a_family_at_a_depth_are_its_single_run(tmp_path, family_file):
+    generator = Generator.open(13.7, file=family_file)
+    generator.write(tmp_path / "single.h5", 5000, seed=SEED)
+    parts = [tmp_path / f"{number}.h5" for number in (1, 2, 3)]
+    for number, part in enumerate(parts, start=1):
+        Generator.open(13.7, file=family_file).write(part, 5000, seed=SEED, shard=Shard(number, 3))
+    merge_shards(parts, tmp_path / "merged.h5")
+    assert contents(tmp_path / "merged.h5") == contents(tmp_path / "single.h5")

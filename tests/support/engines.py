@@ -29,10 +29,13 @@ TESTS = Path(__file__).parents[1]
 RELEASED = TESTS.parent / "models" / "deepmuon_models"
 JAVASCRIPT = TESTS / "engines" / "node_modules"
 
-MODELS = [RELEASED / entry["file"] for entry in json.loads((RELEASED / "manifest.json").read_text("utf-8"))["models"]]
+MODELS = tuple(
+    RELEASED / entry["file"] for entry in json.loads((RELEASED / "manifest.json").read_text("utf-8"))["models"]
+)
 """The released models."""
 
 OUTPUTS = ["kinetic_energy", "direction", "charge"]
+RATE = "rate_hz_per_m2"
 
 
 class Muons(NamedTuple):
@@ -68,7 +71,7 @@ class Engine(NamedTuple):
     missing
         Why it can't run here, or nothing.
     run
-        Makes the muons of a released model, of the latents of its test vectors.
+        Makes the muons of a model, of the latents of its test vectors.
     """
 
     package: str
@@ -78,7 +81,8 @@ class Engine(NamedTuple):
 
 
 def vectors_file(model: Path) -> Path:
-    return TESTS / "vectors" / f"{model.stem}.json"
+    """Return the test vectors of a released model, or of another one those that lie beside it."""
+    return (TESTS / "vectors" if model in MODELS else model.parent) / f"{model.stem}.json"
 
 
 def read_vectors(model: Path) -> dict[str, Any]:
@@ -124,14 +128,14 @@ def javascript(package: str) -> Engine:
         package,
         lambda: json.loads(description.read_text("utf-8"))["version"],
         lambda: missing,
-        lambda model: run_all_in_node(package)[str(model)],
+        lambda model: run_in_node(package, MODELS if model in MODELS else (model,))[str(model)],
     )
 
 
 @cache
-def run_all_in_node(package: str) -> dict[str, Muons]:
-    """Run all models in one process: compiling the engine is what takes time."""
-    files = [str(file) for model in MODELS for file in (model, vectors_file(model))]
+def run_in_node(package: str, models: tuple[Path, ...]) -> dict[str, Muons]:
+    """Run models in one process: compiling the engine is what takes time."""
+    files = [str(file) for model in models for file in (model, vectors_file(model))]
     node = subprocess.run(["node", JAVASCRIPT.parent / "run.js", package, *files], stdout=subprocess.PIPE, check=True)
     return {model: as_muons(columns) for model, columns in json.loads(node.stdout).items()}
 
@@ -180,7 +184,8 @@ def run_in_opencv(model: Path) -> Muons:
 
     network = cv2.dnn.readNetFromONNX(str(model))
     network.setInput(latents(model), "latent")
-    return Muons(*network.forward(OUTPUTS))
+    rate = [RATE] if RATE in network.getUnconnectedOutLayersNames() else []
+    return Muons(*network.forward([*OUTPUTS, *rate])[: len(OUTPUTS)])  # all outputs or none
 
 
 def run_in_tract(model: Path) -> Muons:
@@ -195,7 +200,8 @@ def run_in_tract(model: Path) -> Muons:
         except tract.TractError as error:
             if attempt == 4 or "Impossible to unify" not in str(error):
                 raise
-    return Muons(*(tensor.to_numpy() for tensor in runnable.run([latents(model)])))
+    found = runnable.run([latents(model)])
+    return Muons(*(tensor.to_numpy() for tensor in found[: len(OUTPUTS)]))
 
 
 ENGINES = {

@@ -52,12 +52,23 @@ def cry(tmp_path: Path) -> Path:
         {"provenance": ("made", "changed"), "medium": "G4_CONCRETE", "rate": 60.5, "rate_uncertainty": 0.2},
         {"smoothed": True},
         {"smoothed": False, "rate": 1.5},
+        {"flux": "cry"},
     ],
 )
 def test_a_sample_comes_back_as_it_was_written(tmp_path, known):
     sample = Sample(MUONS, depth_m=10.0, source="the tests", **known)
     write_sample(tmp_path / "sample.h5", sample)
     assert_same(read_sample(tmp_path / "sample.h5"), sample)
+
+
+@pytest.mark.parametrize(("of_model", "geant4s"), [("water", "G4_WATER"), ("rock", "standard_rock 2.65 g/cm3")])
+def test_a_sample_names_its_medium_as_geant4_does(tmp_path, of_model, geant4s):
+    write_sample(tmp_path / "sample.h5", Sample(MUONS, depth_m=10.0, source="a model", medium=of_model))
+    assert read_sample(tmp_path / "sample.h5").medium == geant4s
+
+
+def test_muons_of_cry_say_whose_flux_they_are(cry):
+    assert read_cry(cry).flux == "cry"
 
 
 def test_what_is_unknown_is_left_out_of_the_file(tmp_path):

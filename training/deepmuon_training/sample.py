@@ -10,6 +10,7 @@ from typing import Any
 from deepmuon_runtime.muon_file.reader import read_attributes, read_muons
 from deepmuon_runtime.muon_file.writer import write_muons
 from deepmuon_runtime.muons import Muons
+from deepmuon_training.medium import geant4_medium
 
 __all__ = [
     "Sample",
@@ -42,6 +43,8 @@ class Sample:
     variance_factor : float or None
         How many times larger than of independent muons the variance of counts is: above 1 where muons come in showers;
         None where nobody said.
+    flux : str or None
+        Name of the flux at the surface, `cry` for instance; None where nobody said.
     """
 
     muons: Muons
@@ -53,6 +56,7 @@ class Sample:
     rate_uncertainty: float | None = None
     smoothed: bool | None = None
     variance_factor: float | None = None
+    flux: str | None = None
 
     def __len__(self) -> int:
         """Return the number of muons."""
@@ -74,6 +78,7 @@ class Sample:
             "rate_uncertainty_hz_per_m2": self.rate_uncertainty,
             "smoothed": self.smoothed,
             "variance_factor": self.variance_factor,
+            "flux": self.flux,
         }
         return {name: value for name, value in attributes.items() if value is not None}
 
@@ -101,16 +106,18 @@ def sample_of(muons: Muons, attributes: Mapping[str, Any]) -> Sample:
     rate = attributes.get("rate_hz_per_m2")
     uncertainty = attributes.get("rate_uncertainty_hz_per_m2")
     smoothed, variance_factor = attributes.get("smoothed"), attributes.get("variance_factor")
+    flux = attributes.get("flux")
     return Sample(
         muons=muons,
         depth_m=float(attributes["depth_m"]),
         source=str(attributes.get("source") or attributes["created_by"]),
         provenance=tuple(str(line) for line in attributes.get("provenance", ())),
-        medium=str(attributes["medium"]),
+        medium=geant4_medium(str(attributes["medium"])),
         rate=None if rate is None else float(rate),
         rate_uncertainty=None if uncertainty is None else float(uncertainty),
         smoothed=None if smoothed is None else bool(smoothed),
         variance_factor=None if variance_factor is None else float(variance_factor),
+        flux=None if flux is None else str(flux),
     )
 
 

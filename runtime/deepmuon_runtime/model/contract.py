@@ -1,4 +1,4 @@
-"""Whether a loaded model keeps the ONNX contract, version 1."""
+"""Whether a loaded model keeps the ONNX contract, version 2."""
 
 from __future__ import annotations
 
@@ -7,31 +7,16 @@ from collections.abc import Sequence
 import onnxruntime
 
 from deepmuon_runtime.errors import RefusedError, shown
-from deepmuon_runtime.model.metadata import METADATA_PREFIX, Model
+from deepmuon_runtime.model.metadata import Model
 
-__all__ = ["INPUT", "OUTPUTS", "check_signature", "contract_metadata"]
+__all__ = ["INPUT", "OUTPUTS", "RATE", "check_signature"]
 
 INPUT = "latent"
 OUTPUTS = ("kinetic_energy", "direction", "charge")
+RATE = "rate_hz_per_m2"
+"""An output of models that know their rate, since version 2: it needs no latents."""
 
 _Nodes = dict[str, tuple[str, list[str | int]]]  # name: type, shape
-
-
-def contract_metadata(session: onnxruntime.InferenceSession, name: str) -> dict[str, str]:
-    """Return the keys of the contract in the metadata of a model of this name, without their prefix.
-
-    Raises
-    ------
-    RefusedError
-        If a key or a value is no text.
-    """
-    try:
-        metadata = session.get_modelmeta().custom_metadata_map
-    except UnicodeDecodeError as error:
-        raise RefusedError(f"{name} breaks the contract: its metadata is no text in UTF-8") from error
-    return {
-        key.removeprefix(METADATA_PREFIX): value for key, value in metadata.items() if key.startswith(METADATA_PREFIX)
-    }
 
 
 def check_signature(session: onnxruntime.InferenceSession, model: Model) -> None:
@@ -44,7 +29,7 @@ def check_signature(session: onnxruntime.InferenceSession, model: Model) -> None
         charge: ("tensor(int8)", ["muons"]),
     }
     _check_nodes(model.name, "input", session.get_inputs(), inputs)
-    _check_nodes(model.name, "output", session.get_outputs(), outputs)
+    _check_nodes(model.name, "output", session.get_outputs(), outputs, {RATE: ("tensor(float)", [1])})
 
 
 def _check_nodes(
@@ -52,11 +37,13 @@ def _check_nodes(
     role: str,
     nodes: Sequence[onnxruntime.NodeArg],
     expected: _Nodes,
+    optional: _Nodes | None = None,
 ) -> None:
     try:
         found = {node.name: (node.type, node.shape) for node in nodes}
     except UnicodeDecodeError as error:
         raise RefusedError(f"{name} breaks the contract: the name of an {role} is no text in UTF-8") from error
+    expected = {**expected, **{key: value for key, value in (optional or {}).items() if key in found}}
     if found.keys() != expected.keys():
         raise RefusedError(
             f"{name} breaks the contract: its {role}s are {shown(', '.join(found))}, "

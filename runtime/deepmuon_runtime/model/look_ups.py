@@ -10,9 +10,7 @@ https://github.com/onnx/onnx/blob/main/onnx/onnx.proto
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-from deepmuon_runtime.model.protobuf import field, fields, parts
+from deepmuon_runtime.model.protobuf import fields, with_changed
 
 __all__ = ["with_gather"]
 
@@ -35,23 +33,15 @@ def with_gather(content: bytes) -> bytes:
     ValueError
         If it is no message of Protocol Buffers.
     """
-    return _with_changed(memoryview(content), GRAPH_OF_MODEL, _graph_with_gather)
+    return with_changed(memoryview(content), GRAPH_OF_MODEL, _graph_with_gather)
 
 
 def _graph_with_gather(graph: memoryview) -> bytes:
-    return _with_changed(graph, NODE_OF_GRAPH, _node_with_gather)
+    return with_changed(graph, NODE_OF_GRAPH, _node_with_gather)
 
 
 def _node_with_gather(node: memoryview) -> bytes:
     found = {number: bytes(value) for number, value in fields(node) if isinstance(value, memoryview)}
     if found.get(OPERATOR_OF_NODE) != b"GatherElements" or LOOK_UP not in found.get(NAME_OF_NODE, b""):
         return bytes(node)
-    return _with_changed(node, OPERATOR_OF_NODE, lambda _: b"Gather")
-
-
-def _with_changed(message: memoryview, number: int, change: Callable[[memoryview], bytes]) -> bytes:
-    """Return a message whose fields of a number have other contents."""
-    return b"".join(
-        field(number, change(value)) if found == number and isinstance(value, memoryview) else whole
-        for found, value, whole in parts(message)
-    )
+    return with_changed(node, OPERATOR_OF_NODE, lambda _: b"Gather")

@@ -1,4 +1,7 @@
-"""What a generator says of itself: the metadata of the ONNX contract, version 1."""
+"""What a generator says of itself: the metadata of the ONNX contract, version 2.
+
+Files of version 1, which lack the output of the rate, are read too: nothing else is different for who runs them.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +16,22 @@ import numpy as np
 from deepmuon_runtime.errors import RefusedError, shown
 from deepmuon_runtime.latents.stream import model_stream
 
-__all__ = ["CONTRACT_VERSION", "LARGEST_DRAW", "LATENTS_PER_MUON", "METADATA_PREFIX", "Model", "is_name"]
+__all__ = [
+    "CONTRACT_VERSION",
+    "HORIZONTAL_PLANE",
+    "LARGEST_DRAW",
+    "LATENTS_PER_MUON",
+    "METADATA_PREFIX",
+    "RATE_DIGITS",
+    "SPHERE",
+    "Model",
+    "are_one_rate",
+    "is_name",
+    "is_rate",
+]
 
-CONTRACT_VERSION = 1
+CONTRACT_VERSION = 2
+READ_VERSIONS = (1, 2)
 
 LARGEST_DRAW = 1 << 17
 """The most muons of a draw: the smallest run of the network makes as many."""
@@ -42,9 +58,10 @@ class Model:
     architecture
         "quantile", "transformer", or another name.
     depth_m
-        Depth of the plane that the muons cross, in metres of `medium`.
+        Depth of the plane that the muons cross, in metres of `medium`. Of a family in the list of the released models,
+        the depth at which it is loaded where none is asked for.
     medium
-        What lies above it, by its Geant4 name.
+        What lies above it: `water`, `rock`, or a Geant4 name.
     muons_per_draw
         Muons made of one row of latents.
     latent_size
@@ -55,8 +72,15 @@ class Model:
         Program that made the file, and the licence under which it may be used.
     flux
         The flux at the surface, by its name: `cry`. Where the file does not say it, the name of its creator.
+    surface
+        What the muons cross: 0 is a horizontal plane, 1 a sphere.
+    depth_min_m, depth_max_m
+        Depths that a family has; None in a model of one depth.
     rate_hz_per_m2, rate_uncertainty_hz_per_m2
-        Muons through a horizontal square metre per second, or None where unknown.
+        Muons through a horizontal square metre per second, of a sphere through one across their direction; None where
+        unknown, and in a family that is not loaded: they go with the depth.
+    rate_relative_uncertainty
+        Of the rate, or None where unknown.
     metadata
         All of it as text, without the prefix of the keys.
     """
@@ -74,8 +98,12 @@ class Model:
     created_by: str
     licence: str
     flux: str
+    surface: int
+    depth_min_m: float | None
+    depth_max_m: float | None
     rate_hz_per_m2: float | None
     rate_uncertainty_hz_per_m2: float | None
+    rate_relative_uncertainty: float | None
     metadata: Mapping[str, str]
 
     @classmethod
@@ -104,18 +132,38 @@ class Model:
             values[key] = _value(name, key, texts[key], rule) if key in texts else None
         if values["energy_min_gev"] >= values["energy_max_gev"]:
             raise RefusedError(f"{name} breaks the contract: energy_min_gev is not below energy_max_gev")
+        _check_depths(name, values)
+        values["surface"] = values["surface"] or HORIZONTAL_PLANE
         values["flux"] = values["flux"] or _creator(values["created_by"])
         del values["contract_version"]
         return cls(name=name, sha256=sha256, size=size, metadata=texts, **values)
 
     @property
+    def is_family(self) -> bool:
+        """Whether the file has any depth from `depth_min_m` to `depth_max_m`."""
+        return self.depth_min_m is not None
+
+    @property
+    def depths(self) -> str:
+        """The depths that the file has, in metres: "10", or of a family "0 to 100"."""
+        return f"{self.depth_min_m:g} to {self.depth_max_m:g}" if self.is_family else f"{self.depth_m:g}"
+
+    def has_depth(self, depth_m: float) -> bool:
+        """Tell whether the file has the muons of a depth; of a family depths are float32."""
+        if self.depth_min_m is None or self.depth_max_m is None:
+            return depth_m == self.depth_m
+        with np.errstate(over="ignore"):
+            least, depth, most = np.array([self.depth_min_m, depth_m, self.depth_max_m], np.float32)
+        return bool(least <= depth <= most)
+
+    @property
     def stream(self) -> int:
         """The stream of random numbers that makes its muons, 0 to 2^64 - 1."""
-        return model_stream(self.architecture, self.flux, self.medium, HORIZONTAL_PLANE, self.depth_m)
+        return model_stream(self.architecture, self.flux, self.medium, self.surface, self.depth_m)
 
 
-HORIZONTAL_PLANE = 0
-"""The surface that the muons of contract 1 cross."""
+HORIZONTAL_PLANE, SPHERE = 0, 1
+"""Surfaces that muons cross."""
 
 
 class _Rule(NamedTuple):
@@ -142,9 +190,12 @@ _NAME = _Rule(str, is_name, "a name of printable characters")
 _TEXT = _Rule(str, bool, "a text")
 _POSITIVE = _Rule(float, lambda x: _LEAST <= x <= _MOST, f"a positive number from {_LEAST:.3g} to {_MOST:.3g}")
 _NOT_NEGATIVE = _Rule(float, lambda x: 0 <= x < math.inf, "a number from 0 on")
+_FLOAT32 = _Rule(float, lambda x: 0 <= x <= _MOST, f"a number from 0 to {_MOST:.3g}")
 
 _REQUIRED = {
-    "contract_version": _Rule(int, lambda x: x == CONTRACT_VERSION, f"{CONTRACT_VERSION} for this release"),
+    "contract_version": _Rule(
+        int, lambda x: x in READ_VERSIONS, f"{' or '.join(map(str, READ_VERSIONS))} for this release"
+    ),
     "architecture": _NAME,
     "depth_m": _NOT_NEGATIVE,
     "medium": _NAME,
@@ -155,7 +206,51 @@ _REQUIRED = {
     "created_by": _TEXT,
     "licence": _TEXT,
 }
-_OPTIONAL = {"flux": _NAME, "rate_hz_per_m2": _POSITIVE, "rate_uncertainty_hz_per_m2": _NOT_NEGATIVE}
+_OPTIONAL = {
+    "flux": _NAME,
+    "surface": _Rule(int, lambda x: x in (HORIZONTAL_PLANE, SPHERE), "0, a horizontal plane, or 1, a sphere"),
+    "depth_min_m": _FLOAT32,
+    "depth_max_m": _FLOAT32,
+    "rate_hz_per_m2": _POSITIVE,
+    "rate_uncertainty_hz_per_m2": _NOT_NEGATIVE,
+    "rate_relative_uncertainty": _NOT_NEGATIVE,
+}
+
+
+RATE_DIGITS = 5
+"""Of a rate that a graph gives in float32, whose last digits go with the type of CPU."""
+
+
+def are_one_rate(rate: float, other: float) -> bool:
+    """Tell whether two numbers are the rate of one model, but for its rounding."""
+    return math.isclose(rate, other, rel_tol=10 ** (1 - RATE_DIGITS))
+
+
+def is_rate(rate: float) -> bool:
+    """Tell whether a number can be the rate of a model."""
+    return _POSITIVE.is_good(rate)
+
+
+def _check_depths(name: str, values: Mapping[str, Any]) -> None:
+    """Refuse depths that are no family's and no single one."""
+    least, most = values["depth_min_m"], values["depth_max_m"]
+    if least is None and most is None:
+        return
+    if least is None or most is None:
+        raise RefusedError(f"{name} breaks the contract: depth_min_m and depth_max_m go together, and one is missing")
+    if not least < most:
+        raise RefusedError(
+            f"{name} breaks the contract: a family needs two depths or more, and depth_min_m, {least:g}, is not below "
+            f"depth_max_m, {most:g}"
+        )
+    if not least <= values["depth_m"] <= most:
+        raise RefusedError(
+            f"{name} breaks the contract: depth_m is {values['depth_m']:g}, and should be from {least:g} to {most:g}"
+        )
+    if values["rate_hz_per_m2"] is not None or values["rate_uncertainty_hz_per_m2"] is not None:
+        raise RefusedError(
+            f"{name} breaks the contract: the rate of a family goes with the depth, and its metadata has one"
+        )
 
 
 def _creator(created_by: str) -> str:

@@ -7,9 +7,9 @@ Source: https://protobuf.dev/programming-guides/encoding/
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
-__all__ = ["field", "fields", "parts"]
+__all__ = ["field", "fields", "parts", "varint_field", "with_changed"]
 
 VARINT, EIGHT_BYTES, LENGTH, FOUR_BYTES = 0, 1, 2, 5
 FIXED = {EIGHT_BYTES: 8, FOUR_BYTES: 4}
@@ -39,6 +39,25 @@ def fields(message: memoryview) -> Iterator[tuple[int, int | memoryview]]:
 def field(number: int, content: bytes) -> bytes:
     """Return a field that holds a text, numbers or a message."""
     return _as_varint(number << 3 | LENGTH) + _as_varint(len(content)) + content
+
+
+def varint_field(number: int, value: int) -> bytes:
+    """Return a field that holds a whole number from 0 on."""
+    return _as_varint(number << 3 | VARINT) + _as_varint(value)
+
+
+def with_changed(message: memoryview, number: int, change: Callable[[memoryview], bytes]) -> bytes:
+    """Return a message whose fields of a number have other contents; all else stays, byte for byte.
+
+    Raises
+    ------
+    ValueError
+        If the bytes are no message.
+    """
+    return b"".join(
+        field(number, change(value)) if found == number and isinstance(value, memoryview) else whole
+        for found, value, whole in parts(message)
+    )
 
 
 def parts(message: memoryview) -> Iterator[tuple[int, int | memoryview, memoryview]]:

@@ -38,12 +38,12 @@ def default_architecture() -> str:
 
 
 def released_model(depth: float, architecture: str | None = None) -> Model:
-    """Return the released model of a depth.
+    """Return the released model of a depth: a family where there is one, else the model of that depth alone.
 
     Parameters
     ----------
     depth
-        Metres of water.
+        Metres of water; any number in the range of a family.
     architecture
         "quantile" or "transformer"; the default one if left out.
 
@@ -59,10 +59,12 @@ def released_model(depth: float, architecture: str | None = None) -> Model:
     architectures = sorted({model.architecture for model in models})
     if wanted not in architectures:
         raise RefusedError(f"no released model is a {wanted!r}: {_there_are(architectures)}")
-    depths = {model.depth_m: model for model in models if model.architecture == wanted}
-    if depth not in depths:
-        raise RefusedError(f"no {wanted} model for a depth of {depth:g} m: {_there_are([f'{d:g}' for d in depths])} m")
-    return depths[depth]
+    models = sorted((model for model in models if model.architecture == wanted), key=lambda model: not model.is_family)
+    for model in models:
+        if model.has_depth(float(depth)):
+            return model
+    depths = [model.depths for model in models]
+    raise RefusedError(f"no {wanted} model for a depth of {depth:g} m: {_there_are(depths)} m")
 
 
 def read_released(model: Model) -> bytes:

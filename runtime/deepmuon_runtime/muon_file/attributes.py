@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.latents.philox import LARGEST_SEED
 from deepmuon_runtime.latents.shard import Shard
-from deepmuon_runtime.model.metadata import Model, is_name
+from deepmuon_runtime.model.metadata import Model, are_one_rate, is_name
 from deepmuon_runtime.muon_file.checksum import attributes_crc32, unlike
 from deepmuon_runtime.muon_file.format import ATTRIBUTES_CHECKSUM
 
@@ -207,8 +207,13 @@ def _choice_defects(sound: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _model_defects(sound: Mapping[str, Any], model: Model) -> Iterator[str]:
+    if "depth_m" in sound and model.is_family and not model.has_depth(sound["depth_m"]):
+        yield f"the attribute depth_m is {sound['depth_m']:g}, and its model {model.name} has {model.depths}"
+        return
     for name in ("depth_m", "medium", "architecture", "rate_hz_per_m2", "rate_uncertainty_hz_per_m2"):
         expected, found = getattr(model, name), sound.get(name)
+        if model.is_family and "rate" in name and found and expected and are_one_rate(found, expected):
+            continue  # of another type of CPU
         if found != expected:
             yield f"the attribute {name} is {_shown(found)}, and that of its model {model.name} is {_shown(expected)}"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import chain
@@ -15,7 +16,7 @@ import numpy as np
 from deepmuon_runtime.errors import reason
 from deepmuon_runtime.memory_limit import is_limited
 from deepmuon_runtime.model.metadata import Model
-from deepmuon_runtime.model.released import list_models
+from deepmuon_runtime.model.released import list_models, read_released
 from deepmuon_runtime.muon_file.attributes import attribute_defects, checksum_defects, is_generated, sound_attributes
 from deepmuon_runtime.muon_file.checksum import unlike
 from deepmuon_runtime.muon_file.columns import (
@@ -119,7 +120,7 @@ def _report(file: h5py.File, version: int, progress: Callable[[int], object]) ->
     if attributes:
         report.defects += checksum_defects(attributes, version)
     if is_generated(attributes):
-        report.model = _released_model(attributes.get("model_sha256"))
+        report.model = _released_model(sound_attributes(attributes))
     report.attributes = sound_attributes(attributes)
     report.defects += attribute_defects(attributes, report.model)
     there = columns_of(group, version)
@@ -155,8 +156,16 @@ def _reason(error: Exception) -> str:
     return why
 
 
-def _released_model(sha256: object) -> Model | None:
-    return next((model for model in list_models() if model.sha256 == sha256), None)
+def _released_model(sound: dict[str, Any]) -> Model | None:
+    """Return the released model that made the muons; a family at their depth, where it has that."""
+    shipped = next((model for model in list_models() if model.sha256 == sound.get("model_sha256")), None)
+    depth = sound.get("depth_m", math.nan)
+    if shipped is None or not shipped.is_family or not shipped.has_depth(depth):
+        return shipped
+    from deepmuon_runtime.model.opening import checked_model, load_model  # ONNX Runtime, which gives the rate
+
+    contents, model = checked_model(read_released(shipped), shipped.name, depth, sound.get("surface"))
+    return load_model(contents, model, "cpu")[1]
 
 
 def _sound_columns(

@@ -400,3 +400,134 @@ testPage(
     },
     { serviceWorkers: "block", complaints: /blocked by Playwright/ },
 );
+
+/** A small family in place of the released models: any depth from 0 to 100 m, and what the page knows of it. */
+const FAMILY = JSON.parse(
+    execFileSync(
+        PYTHON,
+        [
+            "-c",
+            `
+import base64, json, sys
+sys.path.insert(0, "tests")
+from support.tiny_families import tiny_family, tiny_rate
+from deepmuon_runtime.latents.philox import latents
+from deepmuon_runtime.model.opening import checked_model, load_model
+content = tiny_family()
+_, model, _ = load_model(*checked_model(content, "family.onnx"), "cpu")
+fields = "name sha256 architecture flux medium surface depth_m depth_min_m depth_max_m muons_per_draw latent_size"
+known = {field: getattr(model, field) for field in f"{fields} energy_min_gev energy_max_gev rate_hz_per_m2".split()}
+known |= {"held_out": None, "rates": [[depth, tiny_rate(depth)] for depth in range(0, 101)]}
+print(json.dumps({"content": base64.b64encode(content).decode(), "model": known}))`,
+        ],
+        { encoding: "utf-8", cwd: new URL("../../..", import.meta.url) },
+    ),
+);
+
+/**
+ * The muons of the family at a depth by the package.
+ *
+ * @param {number} depth
+ * @param {number} number
+ * @param {number} seed
+ * @returns {number[]} their energies
+ */
+function familysEnergies(depth, number, seed) {
+    const program = `
+import json, sys, tempfile, pathlib
+sys.path.insert(0, "tests")
+from support.tiny_families import tiny_family
+from deepmuon_runtime import Generator
+with tempfile.TemporaryDirectory() as folder:
+    path = pathlib.Path(folder, "family.onnx")
+    path.write_bytes(tiny_family())
+    print(json.dumps(Generator.open(${depth}, file=path).sample(${number}, seed=${seed}).kinetic_energy.tolist()))`;
+    const cwd = new URL("../../..", import.meta.url);
+    return JSON.parse(execFileSync(PYTHON, ["-c", program], { encoding: "utf-8", cwd }));
+}
+
+/**
+ * The page with the family among its models.
+ *
+ * @param {Page} page
+ */
+async function openWithFamily(page) {
+    await page
+        .context()
+        .route("**/live/models.json", (route) =>
+            route.fulfill({ json: { ...released, models: [...released.models, FAMILY.model] } }),
+        );
+    await page
+        .context()
+        .route("**/live/models/family.onnx", (route) => route.fulfill({ body: Buffer.from(FAMILY.content, "base64") }));
+    await open(page);
+}
+
+const withoutWorkers = { serviceWorkers: /** @type {const} */ ("block"), complaints: /blocked by Playwright/ };
+
+testPage(
+    "a family offers any depth, and gives the muons that the package makes of it there",
+    async (page) => {
+        const fields = [page.locator("#slider"), page.getByLabel("Metres of water")];
+        for (const field of fields) assert.ok(await field.isHidden());
+        await openWithFamily(page);
+        for (const field of fields) assert.ok(await field.isVisible());
+        for (const depth of [13.7, 0, 100]) {
+            await page.getByLabel("Metres of water").fill(String(depth));
+            await page.getByRole("status").getByText("The spectrum ").waitFor();
+            await generate(page, { number: "1000", seed: "5" });
+            await finished(page);
+            assert.match(await page.locator("#command").innerText(), new RegExp(`--depth ${depth} `));
+            const { name, muons } = await saveCsv(page);
+            assert.equal(name, `muons-quantile-${depth}m-seed-5.csv`);
+            for (const [i, energy] of familysEnergies(depth, 1000, 5).entries()) {
+                assert.ok(Math.abs(muons[i][0] / energy - 1) < 1e-5, `energy ${i} at ${depth} m`);
+            }
+        }
+    },
+    withoutWorkers,
+);
+
+testPage(
+    "the spectrum moves with the slider",
+    async (page) => {
+        await openWithFamily(page);
+        const slider = page.getByLabel("Slide through the water");
+        const curve = page.locator("#energy polyline.generated").first();
+        const seen = new Set();
+        for (const share of [0, 250, 500, 1000]) {
+            await slider.fill(String(share));
+            const metres = await page.getByLabel("Metres of water").inputValue();
+            const place = metres === "0" ? "at sea level" : `under ${metres} m of water`;
+            await page.getByRole("status").getByText(`The spectrum ${place}, of 32,768 muons.`).waitFor();
+            seen.add(await curve.getAttribute("points"));
+        }
+        assert.equal(seen.size, 4);
+        await slider.focus();
+        await page.keyboard.press("ArrowLeft");
+        await page
+            .getByRole("status")
+            .getByText(/The spectrum under 9\d/)
+            .waitFor();
+    },
+    withoutWorkers,
+);
+
+testPage(
+    "a depth that a family has not is explained at its field",
+    async (page) => {
+        await openWithFamily(page);
+        await generate(page, {});
+        await finished(page);
+        await page.getByLabel("Metres of water").fill("101");
+        await page.getByRole("button", { name: "Generate" }).click();
+        const input = page.getByLabel("Metres of water");
+        assert.ok(await input.evaluate((element) => element === document.activeElement));
+        assert.equal(await page.locator("#metres-note").innerText(), "How deep? From 0 to 100 m, such as 13.7.");
+        await page.getByLabel("Depth").selectOption("10");
+        assert.ok(await input.isHidden());
+        await generate(page, {});
+        await finished(page);
+    },
+    withoutWorkers,
+);

@@ -2,10 +2,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+import onnx
 import pytest
+from onnx import TensorProto, helper, numpy_helper
+from support.tiny_families import tiny_family
 from support.tiny_models import METADATA, tiny_model
 
 from deepmuon_runtime import Generator, RefusedError
+from deepmuon_runtime.model.baking import bake
+from deepmuon_runtime.model.family import with_metadata
 
 
 def refusal(folder: Path, content: bytes) -> str:
@@ -45,8 +51,8 @@ def test_a_model_that_lacks_a_key_is_refused(tmp_path, key):
 @pytest.mark.parametrize(
     ("key", "value", "meaning"),
     [
-        ("contract_version", "2", "1 for this release"),
-        ("contract_version", "one", "1 for this release"),
+        ("contract_version", "3", "1 or 2 for this release"),
+        ("contract_version", "one", "1 or 2 for this release"),
         ("created_by", "", "a text"),
         ("architecture", "", "a name"),
         ("architecture", "q\x1b[2J", "a name"),
@@ -126,3 +132,33 @@ def test_a_file_that_is_no_model_is_refused(tmp_path, content):
 def test_a_path_that_is_no_file_is_refused(tmp_path, name, reason):
     with pytest.raises(RefusedError, match=reason):
         Generator.open(file=tmp_path / name)
+
+
+def test_the_rate_is_read_from_the_graph_where_the_metadata_lacks_it(tmp_path):
+    path = tmp_path / "model.onnx"
+    path.write_bytes(with_metadata(bake(tiny_family(), 13.7), {"rate_hz_per_m2": None}))
+    model = Generator.open(file=path).model
+    assert (model.rate_hz_per_m2, model.rate_uncertainty_hz_per_m2) == (82.6, 0.165)
+
+
+def test_a_rate_that_is_not_that_of_the_metadata_is_refused(tmp_path):
+    content = with_metadata(bake(tiny_family(), 13.7), {"rate_hz_per_m2": "82.7"})
+    assert "its rate is 82.6, and 82.7 in its metadata" in refusal(tmp_path, content)
+
+
+@pytest.mark.parametrize(("kind", "shape"), [("DOUBLE", [1]), ("FLOAT", [2]), ("FLOAT", [])])
+def test_a_rate_of_another_type_or_shape_is_refused(tmp_path, kind, shape):
+    model = onnx.load_from_string(bake(tiny_family(), 13.7))
+    (rate,) = (output for output in model.graph.output if output.name == "rate_hz_per_m2")
+    (stored,) = (tensor for tensor in model.graph.initializer if tensor.name == "rate_hz_per_m2/baked")
+    value = np.full(shape, 82.6, np.float64 if kind == "DOUBLE" else np.float32)
+    stored.CopyFrom(numpy_helper.from_array(value, stored.name))
+    rate.CopyFrom(helper.make_tensor_value_info(rate.name, getattr(TensorProto, kind), shape))
+    assert "its output rate_hz_per_m2 is tensor" in refusal(tmp_path, model.SerializeToString())
+
+
+@pytest.mark.parametrize("version", ["1", "2"])
+def test_a_model_without_the_rates_output_is_read_in_either_version(tmp_path, version):
+    path = tmp_path / "model.onnx"
+    path.write_bytes(tiny_model(metadata={"contract_version": version}))
+    assert Generator.open(file=path).model.rate_hz_per_m2 == 55.5

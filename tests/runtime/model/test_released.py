@@ -63,3 +63,18 @@ def test_an_installation_without_its_models_says_so(released: Path, manifest):
     file.unlink() if manifest is None else file.write_text(manifest)
     with pytest.raises(RefusedError, match="install deepmuon-runtime again"):
         list_models()
+
+
+@pytest.mark.usefixtures("released_family")
+def test_a_family_wins_over_a_model_of_one_depth():
+    assert Generator.open(10).model.name == "quantile-water.onnx"
+    assert Generator.open(13.7).model.depth_m == 13.7
+    assert Generator.open(10, "transformer").model.name == "transformer-10m.onnx"
+    assert [model.depths for model in list_models()] == ["0", "10", "0 to 100", "10"]
+
+
+@pytest.mark.usefixtures("released_family")
+@pytest.mark.parametrize("depth", [100.1, -1, float("nan")])
+def test_a_depth_outside_a_family_is_refused_with_its_range(depth):
+    with pytest.raises(RefusedError, match="there are 0 to 100, 0 and 10 m"):
+        Generator.open(depth)

@@ -21,8 +21,12 @@ MODEL = Model(
     created_by="a test",
     licence="BSD-3-Clause",
     flux="cry",
+    surface=0,
+    depth_min_m=None,
+    depth_max_m=None,
     rate_hz_per_m2=50.0,
     rate_uncertainty_hz_per_m2=0.1,
+    rate_relative_uncertainty=None,
     metadata={},
 )
 ALWAYS = {

@@ -99,3 +99,9 @@ def test_a_killed_worker_changes_nothing(model_file, single, tmp_path: Path):
         distributed.wait(made, timeout=LONGEST)
         assert are_equal(Muons(*client.gather(made)), single)
         assert killed not in client.scheduler_info()["workers"]
+
+
+def test_a_depth_of_a_family_goes_to_the_workers(family_file):
+    arrays = muon_arrays(5001, seed=5, file=family_file, depth=13.7, chunk=1000)
+    single = Generator.open(13.7, file=family_file).sample(5001, seed=5)
+    assert are_equal(computed(arrays, scheduler="threads"), single)

@@ -63,10 +63,11 @@ def assert_physical(muons: Muons, energy_range: tuple[float, float]) -> None:
 def test_a_model_says_what_the_contract_asks_for(proto, exportable):
     low, high = exportable.energy_range
     assert {p.key: p.value for p in proto.metadata_props} == {
-        "deepmuon.contract_version": "1",
+        "deepmuon.contract_version": "2",
         "deepmuon.architecture": exportable.architecture,
         "deepmuon.depth_m": "0",
-        "deepmuon.medium": "G4_WATER",
+        "deepmuon.medium": "water",
+        "deepmuon.surface": "0",
         "deepmuon.muons_per_draw": str({"quantile": 1, "transformer": 16}[exportable.architecture]),
         "deepmuon.latent_size": str({"quantile": 5, "transformer": 132}[exportable.architecture]),
         "deepmuon.energy_min_gev": str(low),
@@ -75,6 +76,7 @@ def test_a_model_says_what_the_contract_asks_for(proto, exportable):
         "deepmuon.licence": "BSD-3-Clause",
         "deepmuon.rate_hz_per_m2": "129.035",
         "deepmuon.rate_uncertainty_hz_per_m2": "0.25",
+        "deepmuon.rate_relative_uncertainty": "0.00194",
         "deepmuon.boxcox_lambda": "9",
         "deepmuon.energy_mean": f"{exportable.energy_mean:.9g}",
         "deepmuon.training_source": "a parametric flux",
@@ -88,7 +90,8 @@ def test_a_model_leaves_out_what_is_unknown(exportable, sample, tmp_path):
     unknown = replace(sample, rate=None, rate_uncertainty=None, smoothed=None)
     export(exportable, Training.of(unknown, seed=1), tmp_path / "model.onnx")
     keys = {p.key.removeprefix("deepmuon.") for p in onnx.load(tmp_path / "model.onnx").metadata_props}
-    assert keys.isdisjoint({"rate_hz_per_m2", "rate_uncertainty_hz_per_m2", "training_smoothed"})
+    assert keys.isdisjoint({"rate_hz_per_m2", "rate_uncertainty_hz_per_m2", "training_smoothed", "flux"})
+    assert "rate_hz_per_m2" not in {value.name for value in onnx.load(tmp_path / "model.onnx").graph.output}
     assert {"depth_m", "training_seed"} <= keys
 
 
@@ -108,7 +111,14 @@ def test_inputs_and_outputs_are_the_contracts(proto, exportable):
         "kinetic_energy": (TensorProto.FLOAT, ["muons"]),
         "direction": (TensorProto.FLOAT, ["muons", 3]),
         "charge": (TensorProto.INT8, ["muons"]),
+        "rate_hz_per_m2": (TensorProto.FLOAT, [1]),
     }
+
+
+def test_a_model_gives_its_rate_without_a_muon(model, exportable, sample):
+    session = onnxruntime.InferenceSession(model, providers=["CPUExecutionProvider"])
+    (rate,) = session.run(["rate_hz_per_m2"], {"latent": np.zeros((0, exportable.latent_size), dtype=np.float32)})
+    np.testing.assert_array_equal(rate, np.float32([sample.rate]))
 
 
 def test_a_model_passes_the_full_check_of_onnx(proto):

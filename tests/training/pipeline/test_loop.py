@@ -388,3 +388,13 @@ def test_a_slab_that_too_few_muons_cross_ends_the_run(folder: Path, tmp_path: Pa
     pipeline.steps[2].run(progress=False)
     with pytest.raises(FailedError, match=r"fit what came through at 60 m: \d+ muons are too few to learn from"):
         pipeline.steps[3].run(progress=False)
+
+
+def test_a_run_may_end_in_a_family_of_its_generators(folder: Path):
+    (folder / "family.toml").write_text(f"direct = true\nfamily = true\n{TINY}")
+    pipeline = planned(folder, "family.toml", "family")
+    pipeline.run(lambda line: None, progress=False)
+    model = Generator.open(file=folder / "family" / "quantile-family.onnx", depth=0.6, device="cpu").model
+    above, below = rows(pipeline.layers)
+    assert (model.depth_min_m, model.depth_max_m) == (0, 1)
+    assert below.rate_hz_per_m2 < model.rate_hz_per_m2 < above.rate_hz_per_m2

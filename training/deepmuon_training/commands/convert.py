@@ -186,7 +186,7 @@ def _read(path: Path, form: str, stated: dict[str, Any]) -> tuple[Sample, dict[s
     if form == "cry-text":
         muons, _, count_variance = read_cry_text(path)
         told = f"{path.name}, CRY's text output: {len(muons):,} muons"
-        sample = Sample(muons, depth_m=0.0, source=stated["source"] or "CRY", provenance=(told,))
+        sample = Sample(muons, depth_m=0.0, source=stated["source"] or "CRY", provenance=(told,), flux="cry")
         return _with_rate(drop_lowest(sample, "MeV"), stated, count_variance), {}
     return _read_table(path, form, stated)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from deepmuon_cli.options.quantities import muon_number, positive_number, seed_number
+from deepmuon_cli.options.quantities import muon_number, number_from_zero, positive_number, seed_number
 
 __all__ = ["command"]
 
@@ -28,6 +28,7 @@ TIMES_HELD_OUT = 10  # more than these would no longer lessen the noise
     metavar="NUMBER",
     help="Muons to generate; if left out ten times the held-out ones, but at most 2e7.",
 )
+@click.option("--depth", type=number_from_zero, metavar="METRES", help="Of a family: where it is scored.")
 @click.option("--seed", type=seed_number, default="1", show_default=True, help="Of the generated muons.")
 @click.option(
     "--variance-factor",
@@ -43,6 +44,7 @@ def command(
     output: Path,
     json_output: Path | None,
     number: int | None,
+    depth: float | None,
     seed: int,
     variance_factor: float | None,
     overwrite: bool,
@@ -60,7 +62,7 @@ def command(
     MODEL is any ONNX file that keeps the project's contract. The report is one HTML file with tables and pictures,
     which needs no network. Each score stands beside what two alike samples of these sizes show. 100,000 muons are
     the fewest, of either; only more of them show small errors: a target that their noise hides is neither met nor
-    missed. Both have to be from one depth, in one medium.
+    missed. Both have to be from one depth, in one medium; of a family, --depth says which.
 
     Muons that come in showers are not independent: their counts vary by more than their square root. --variance-factor
     says by how much; of CRY's spectra it is 1.17 at most.
@@ -81,7 +83,7 @@ def command(
     from deepmuon_training.scores.model_evaluation import evaluate_model
     from deepmuon_training.scores.scorecard import markdown_scorecard
 
-    facts, truth = Generator.open(file=model, device="cpu").model, read_sample(held_out)
+    facts, truth = Generator.open(file=model, depth=depth, device="cpu").model, read_sample(held_out)
     number = number or max(FEWEST_MUONS, min(MOST_MUONS, TIMES_HELD_OUT * len(truth)))
     with progress_bar(number, "drawing", " muons", hidden=quiet) as bar:
 
@@ -90,7 +92,9 @@ def command(
             if bar.n == number:
                 bar.set_description("drawn, scoring takes a minute or two", refresh=sys.stderr.isatty())
 
-        evaluation = evaluate_model(model, truth, number, seed=seed, variance_factor=variance_factor, progress=drawn)
+        evaluation = evaluate_model(
+            model, truth, number, seed=seed, variance_factor=variance_factor, depth=depth, progress=drawn
+        )
     write_whole(output, html_report(evaluation, facts, truth, str(held_out)).encode(), overwrite=overwrite)
     if json_output is not None:
         write_whole(json_output, evaluation.to_json().encode(), overwrite=overwrite)

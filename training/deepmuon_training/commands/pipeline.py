@@ -57,6 +57,7 @@ def command(settings: Path, sample: Path, work: Path, held_out: tuple[Path, ...]
         muons_per_part = 500_000      carried between two savings
         scored_muons = 20_000_000     drawn to compare a generator with held-out muons
         direct = false                carry on the muons that came through, with no network between
+        family = false                in the end one model of all depths, also between the layers
         seed = 1                      from which all seeds are derived
 
     and tables for the fit: [quantile.zenith], [quantile.charge], [transformer], [transformer.schedule], ..., with the

@@ -19,6 +19,7 @@ _COMMANDS = {
     "transport": "Carry muons through water or another material by Geant4.",
     "fit": "Train a generator on a muon file.",
     "export": "Write a trained generator as an ONNX file.",
+    "family": "Write generators of several depths as one ONNX file for any depth between.",
     "evaluate": "Compare an ONNX generator with a muon file.",
     "pipeline": "Go from sea-level muons to a generator for every depth.",
 }

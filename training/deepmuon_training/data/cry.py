@@ -98,6 +98,7 @@ def read_cry(path: str | Path, part: slice = slice(None)) -> Sample:
         rate_uncertainty=rate * float(np.sqrt(CRY_SHOWER_VARIANCE / total)),
         smoothed=False,
         variance_factor=CRY_VARIANCE_FACTOR,
+        flux="cry",
     )
 
 

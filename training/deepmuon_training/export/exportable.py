@@ -8,7 +8,7 @@ import torch
 
 from deepmuon_training.export.graph import Graph
 
-__all__ = ["Exportable"]
+__all__ = ["Exportable", "Family"]
 
 
 class Exportable(Protocol):
@@ -43,3 +43,48 @@ class Exportable(Protocol):
 
     def graph(self) -> tuple[Graph, str, str, str]:
         """Build the graph; returns it with the names of energy, direction and charge."""
+
+
+class Family(Protocol):
+    """Generators of any depth between those of the outermost knots, as stored numbers."""
+
+    @property
+    def architecture(self) -> str:
+        """Its name."""
+
+    @property
+    def latent_size(self) -> int:
+        """Uniform numbers of a draw."""
+
+    @property
+    def muons_per_draw(self) -> int:
+        """Muons made of them."""
+
+    @property
+    def energy_range(self) -> tuple[float, float]:
+        """Lowest and highest kinetic energy [GeV] at any depth."""
+
+    @property
+    def depths(self) -> tuple[float, ...]:
+        """Of the knots in metres, ascending."""
+
+    @property
+    def surfaces(self) -> tuple[int, ...]:
+        """0 for a horizontal plane, 1 for a sphere."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What its users should know."""
+
+    def at(self, depth_m: float, surface: int) -> Exportable:
+        """Return the generator of a depth, for an evaluation in PyTorch in double precision."""
+
+    def rate(self, depth_m: float, surface: int) -> float | None:
+        """Return its rate; None where unknown."""
+
+    def graph(self) -> tuple[Graph, str, str, str, str | None]:
+        """Build the graph; returns it with the names of energy, direction, charge and rate, if that is known.
+
+        Its depth and surface are the initializers ``depth_m``, that of the first knot, and ``surface``, 0; the names of
+        nodes that depend on these alone begin with ``depth/``.
+        """

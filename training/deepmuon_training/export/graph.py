@@ -11,13 +11,16 @@ import onnx
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
-__all__ = ["IR_VERSION", "OPSET", "Graph"]
+__all__ = ["IR_VERSION", "OPSET", "RATE", "Graph"]
 
 OPSET = 20
 """The newest operator set that ONNX Runtime 1.17 reads."""
 
 IR_VERSION = 9
 """Likewise, of the file format."""
+
+RATE = "rate/value"
+"""What the output of the rate is a copy of: a constant, or a value of the depth."""
 
 
 class Graph:
@@ -71,6 +74,17 @@ class Graph:
             self._constants[key] = name or f"constant_{len(self._constants)}"
             self.initializers.append(numpy_helper.from_array(array, self._constants[key]))
         return self._constants[key]
+
+    def changeable(self, value: NDArray[Any], name: str) -> str:
+        """Return the name of a constant that is stored by itself, so that it can be changed in the file."""
+        self.initializers.append(numpy_helper.from_array(value, name))
+        return name
+
+    def named(self, value: str, name: str) -> str:
+        """Give the value of a node that nothing uses yet another name, and return that."""
+        (node,) = (node for node in self.nodes if value in node.output)
+        node.output[list(node.output).index(value)] = name
+        return name
 
     def model(
         self,

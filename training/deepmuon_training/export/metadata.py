@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from importlib.metadata import version
 
+import numpy as np
+
 from deepmuon_runtime.model.metadata import CONTRACT_VERSION
 from deepmuon_training.energy_transform import LAMBDA
-from deepmuon_training.export.exportable import Exportable
+from deepmuon_training.export.exportable import Exportable, Family
+from deepmuon_training.medium import model_medium
 from deepmuon_training.sample import Sample
 
-__all__ = ["LICENCE", "Training", "metadata"]
+__all__ = ["LICENCE", "Training", "depth_text", "family_metadata", "metadata"]
 
 LICENCE = "BSD-3-Clause"
 
@@ -21,7 +25,7 @@ class Training:
 
     Parameters
     ----------
-    depth_m, medium, source, provenance, rate, rate_uncertainty, smoothed
+    depth_m, medium, source, provenance, rate, rate_uncertainty, smoothed, flux
         Of the sample, see `deepmuon_training.sample.Sample`.
     muons
         How many.
@@ -44,6 +48,7 @@ class Training:
     seed: int
     zenith_max_deg: float | None = None
     charge: int | None = None
+    flux: str | None = None
 
     @classmethod
     def of(cls, sample: Sample, seed: int, *, zenith_max: float = 90.0, charge: int | None = None) -> Training:
@@ -55,11 +60,52 @@ class Training:
 
 def metadata(generator: Exportable, training: Training) -> dict[str, str]:
     """Return the model's metadata; what is unknown is left out."""
+    place = {"depth_m": f"{training.depth_m:g}"}
+    numbers = {
+        "rate_hz_per_m2": None if training.rate is None else f"{training.rate:.6g}",
+        "rate_uncertainty_hz_per_m2": None if training.rate_uncertainty is None else f"{training.rate_uncertainty:.3g}",
+        "rate_relative_uncertainty": _relative(training.rate, training.rate_uncertainty),
+        "boxcox_lambda": LAMBDA,
+        "energy_mean": f"{generator.energy_mean:.9g}",
+    }
+    return _texts(generator, place, training, numbers)
+
+
+def family_metadata(
+    family: Family, knots: Sequence[Training], rate_relative_uncertainty: float | None
+) -> dict[str, str]:
+    """Return the same of a family; training is that of all knots, in order.
+
+    What only some of them say, or say otherwise, is left out.
+    """
+    place = {
+        "depth_m": depth_text(family.depths[0]),
+        "depth_min_m": depth_text(family.depths[0]),
+        "depth_max_m": depth_text(family.depths[-1]),
+        "knots_m": " ".join(map(depth_text, family.depths)),
+    }
+    known = {"rate_relative_uncertainty": _short(rate_relative_uncertainty)}
+    limits = [knot.zenith_max_deg for knot in knots if knot.zenith_max_deg is not None]
+    together: dict[str, str | None] = {
+        "training_source": "; ".join(dict.fromkeys(knot.source for knot in knots)),
+        "training_muons": str(sum(knot.muons for knot in knots)),
+        "zenith_max_deg": f"{max(limits):.6g}" if len(limits) == len(knots) else None,
+    }
+    each = [{**_texts(family, place, knot, known), **together} for knot in knots]
+    texts = {key: {one.get(key) for one in each} for key in each[-1]}
+    return {key: text for key, found in texts.items() if len(found) == 1 and (text := found.pop()) is not None}
+
+
+def _texts(
+    generator: Exportable | Family, place: Mapping[str, str], training: Training, numbers: Mapping[str, object]
+) -> dict[str, str]:
     known = {
         "contract_version": CONTRACT_VERSION,
         "architecture": generator.architecture,
-        "depth_m": f"{training.depth_m:g}",
-        "medium": training.medium,
+        "flux": training.flux,
+        **place,
+        "medium": model_medium(training.medium),
+        "surface": 0,  # a horizontal plane
         "muons_per_draw": generator.muons_per_draw,
         "latent_size": generator.latent_size,
         "energy_min_gev": generator.energy_range[0],  # all digits: a muon that the graph clips is within
@@ -68,13 +114,23 @@ def metadata(generator: Exportable, training: Training) -> dict[str, str]:
         "only_charge": None if training.charge is None else f"{training.charge:+d}",
         "created_by": f"deepmuon-training {version('deepmuon-training')}",
         "licence": LICENCE,
-        "rate_hz_per_m2": None if training.rate is None else f"{training.rate:.6g}",
-        "rate_uncertainty_hz_per_m2": None if training.rate_uncertainty is None else f"{training.rate_uncertainty:.3g}",
-        "boxcox_lambda": LAMBDA,
-        "energy_mean": f"{generator.energy_mean:.9g}",
+        **numbers,
         "training_source": training.source,
         "training_smoothed": None if training.smoothed is None else str(training.smoothed).lower(),
         "training_muons": training.muons,
         "training_seed": training.seed,
     }
     return {key: str(value) for key, value in known.items() if value is not None}
+
+
+def depth_text(depth_m: float) -> str:
+    """Return the shortest text of a depth as float32."""
+    return np.format_float_positional(np.float32(depth_m), trim="-")
+
+
+def _relative(rate: float | None, uncertainty: float | None) -> str | None:
+    return None if rate is None or uncertainty is None else _short(uncertainty / rate)
+
+
+def _short(number: float | None) -> str | None:
+    return None if number is None else f"{number:.3g}"

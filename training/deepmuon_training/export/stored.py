@@ -56,5 +56,5 @@ class StoredGenerator:
 
     @property
     def energy_mean(self) -> float:
-        """Mean of the transformed energy in training."""
-        return float(self.metadata["energy_mean"])
+        """Mean of the transformed energy in training; NaN of what was a family, where each knot had another."""
+        return float(self.metadata.get("energy_mean", "nan"))

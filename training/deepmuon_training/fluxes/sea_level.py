@@ -59,6 +59,7 @@ def write_sea_level(path: str | Path, flux: Flux, n: int, *, seed: int, overwrit
         source=f"{flux.origin}, {_energy(low)} to {_energy(high)}",
         provenance=(f"{n} muons drawn, {flux.charges}, seed {seed}",),
         rate=plane_rate(flux, low, high),
+        flux=Path(flux.name).stem,
     )
     sampler = PlaneSampler(flux, low, high)
     with MuonWriter(path, sample.attributes, overwrite) as writer:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
-from deepmuon_training.export.exportable import Exportable
+from deepmuon_training.export.exportable import Exportable, Family
 from deepmuon_training.export.stored import StoredGenerator
+from deepmuon_training.families.rates import KnownRate
 from deepmuon_training.learning.support import Support
 from deepmuon_training.sample import Sample
 
@@ -50,11 +52,14 @@ class Architecture(ABC, Generic[Settings, Networks]):
         Dataclass with all that a fit can be told; its defaults made the released models.
     checkpoints : tuple of str
         Names of the files that an interrupted fit leaves.
+    makes_families : bool
+        Whether maps of several depths can be interpolated: `family` then does so.
     """
 
     name: str
     settings: type[Settings]
     checkpoints: tuple[str, ...]
+    makes_families: bool = False
 
     def check_azimuth(self, azimuth: Azimuth) -> None:
         """Refuse a choice of the azimuth that this architecture does not leave; "uniform" stands for none.
@@ -100,6 +105,25 @@ class Architecture(ABC, Generic[Settings, Networks]):
         FailedError
             If a map is not monotone.
         """
+
+    def family(self, knots: Sequence[tuple[float, Any]], density: float, rates: Sequence[KnownRate]) -> Family:
+        """Return a family, if this architecture `makes_families`.
+
+        Parameters
+        ----------
+        knots
+            Depth in metres and what `exportable` gives, of each knot, ascending.
+        density
+            Of the overburden in g/cm3.
+        rates
+            Ascending in depth, among them those of the knots; empty where unknown.
+
+        Raises
+        ------
+        RefusedError
+            If these knots can't be interpolated.
+        """
+        raise NotImplementedError
 
     @abstractmethod
     def read_back(self, stored: StoredGenerator) -> Exportable:

@@ -123,8 +123,4 @@ def export_fitted(generator: FittedGenerator, path: Path, *, overwrite: bool = F
     """
     exportable, notes = architecture(generator.architecture).exportable(generator.networks, generator.training.seed)
     mismatch = export(exportable, generator.training, path, overwrite=overwrite)
-    rounding = (
-        f"ONNX Runtime differs from PyTorch in double precision by at most {mismatch.energy:.1e} of the energy and "
-        f"{mismatch.direction:.1e} of a direction, on 100,000 muons."
-    )
-    return Exported(mismatch, (*generator.notes, *notes, rounding), generator.unphysical_before_mapping)
+    return Exported(mismatch, (*generator.notes, *notes, mismatch.note), generator.unphysical_before_mapping)

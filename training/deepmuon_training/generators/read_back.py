@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_training.export.exportable import Exportable
+from deepmuon_training.export.graph import RATE
 from deepmuon_training.export.stored import StoredGenerator
 from deepmuon_training.generators.registry import architecture
 
 __all__ = ["read_back", "read_numbers"]
+
+BAKED = "baked_from"
+"""Metadata of a file that the runtime made of a family."""
 
 
 def read_back(contents: bytes) -> Exportable:
@@ -26,7 +30,11 @@ def read_back(contents: bytes) -> Exportable:
     """
     stored = StoredGenerator(contents)
     generator = _numbers(stored)
+    if BAKED in stored.metadata:  # a family's nodes, with tables in the place of the first of them
+        return generator
     again = generator.graph()[0]
+    if RATE in stored.constants:
+        again.constant(stored.constants[RATE], RATE)
     outputs = len(stored.graph.output)  # a node each, to give it its name
     if again.nodes != stored.graph.node[:-outputs] or again.initializers != list(stored.graph.initializer):
         raise RefusedError(f"a graph of architecture {generator.architecture} that this release would write otherwise")

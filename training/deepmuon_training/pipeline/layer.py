@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from deepmuon_runtime import Generator, read_attributes
 from deepmuon_runtime.files.whole import write_whole
+from deepmuon_training.generators.family import family_of
 from deepmuon_training.generators.fit import fit_generator
 from deepmuon_training.generators.fitted import FittedGenerator, export_fitted
 from deepmuon_training.pipeline.seeds import step_seed
@@ -16,7 +18,7 @@ from deepmuon_training.sample import read_sample
 from deepmuon_training.scores.model_evaluation import evaluate_model
 from deepmuon_training.transport.slab_file import transport_file
 
-__all__ = ["Layer", "carry", "draw", "export", "fit", "score"]
+__all__ = ["Layer", "carry", "draw", "export", "family", "fit", "score"]
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,11 @@ def fit(layer: Layer, settings: PipelineSettings, folder: Path, progress: bool) 
 def export(layer: Layer) -> None:
     """Write the fitted generator as an ONNX file."""
     export_fitted(FittedGenerator.load(layer.generator), layer.model)
+
+
+def family(layers: Sequence[Layer], model: Path) -> None:
+    """Write the generators of all layers as one ONNX file, for any depth between."""
+    family_of([FittedGenerator.load(layer.generator) for layer in layers]).export(model)
 
 
 def draw(layer: Layer, settings: PipelineSettings, progress: bool) -> None:

@@ -120,6 +120,10 @@ def plan(settings: PipelineSettings, sample: Path, folder: Path, held_out: Seque
     steps = [
         step for layer, below in zip_longest(layers, layers[1:]) for step in _steps(settings, layer, below, len(top))
     ]
+    if settings.family:
+        model = folder / f"{settings.architecture}-family.onnx"
+        what = f"{len(layers)} generators, {layers[0].depth_m:g} to {layers[-1].depth_m:g} m"
+        steps.append(Step("family", what, model, lambda *_: layer_steps.family(layers, model)))
     return Pipeline(settings, folder, tuple(layers), tuple(steps))
 
 

@@ -46,6 +46,8 @@ class PipelineSettings:
         Drawn from a generator to compare it with held-out muons.
     direct
         Carry the muons that came through the slab above, instead of those that its generator draws.
+    family
+        In the end make one model of all generators, for any depth from the first to the last.
     seed
         From which all seeds are derived, by `deepmuon_training.pipeline.seeds.step_seed`.
     fits
@@ -67,6 +69,7 @@ class PipelineSettings:
     muons_per_part: Annotated[int, Range(1, _MOST_MUONS)] = 500_000
     scored_muons: Annotated[int, Range(evaluate.FEWEST_MUONS, _MOST_MUONS)] = 20_000_000
     direct: bool = False
+    family: bool = False
     seed: Annotated[int, Range(0, LARGEST_SEED)] = 1
     fits: Mapping[str, Any] = field(
         default_factory=lambda: {name: architecture(name).settings() for name in ARCHITECTURES}
@@ -77,7 +80,13 @@ class PipelineSettings:
         if self.architecture not in ARCHITECTURES:
             raise RefusedError(f"architecture is {self.architecture!r}, and should be {' or '.join(ARCHITECTURES)}")
         check_ranges(self)
-        architecture(self.architecture).check_azimuth(self.azimuth)
+        kind = architecture(self.architecture)
+        kind.check_azimuth(self.azimuth)
+        if self.family and not (kind.makes_families and self.azimuth == "uniform" and self.layers):
+            raise RefusedError(
+                "family is true, which needs an architecture that makes families (quantile), a uniform azimuth, and "
+                "1 layer at least"
+            )
 
     @property
     def fit(self) -> Any:

@@ -23,7 +23,7 @@ class Step:
     Parameters
     ----------
     kind
-        fit, export, draw, transport or score.
+        fit, export, draw, transport, score or family.
     what
         It works on, in words.
     result

@@ -9,6 +9,7 @@ from pathlib import Path
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.generator import Generator
 from deepmuon_runtime.model.metadata import Model
+from deepmuon_training.medium import model_medium
 from deepmuon_training.sample import Sample
 from deepmuon_training.scores.evaluate import evaluate
 from deepmuon_training.scores.evaluation import Evaluation
@@ -26,6 +27,7 @@ def evaluate_model(
     raw: Sample | None = None,
     unphysical_before_mapping: float | None = None,
     variance_factor: float | None = None,
+    depth: float | None = None,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Evaluation:
     """Draw muons from a model and compare them with held-out ones.
@@ -46,6 +48,8 @@ def evaluate_model(
         As for `deepmuon_training.scores.evaluate.evaluate`.
     variance_factor
         As for the same; if left out what the held-out muons' file says, or 1.
+    depth
+        Of a family: metres at which it is scored; if left out, that which it is loaded with.
     progress
         Called with the number of muons drawn since the last call.
 
@@ -56,7 +60,7 @@ def evaluate_model(
     FailedError
         If the model gives an unphysical muon.
     """
-    generator = Generator.open(file=model, device="cpu")
+    generator = Generator.open(file=model, depth=depth, device="cpu")
     facts = generator.model
     _check_place(facts, held_out)
     drawn = []
@@ -80,10 +84,11 @@ def evaluate_model(
 def _check_place(model: Model, held_out: Sample) -> None:
     """Refuse muons of another place: two depths differ by far more than any generator from its sample."""
     same_depth = isclose(model.depth_m, held_out.depth_m, rel_tol=1e-5, abs_tol=1e-5)
-    if not same_depth or (held_out.depth_m > 0 and model.medium != held_out.medium):
+    medium, other = model_medium(model.medium), model_medium(held_out.medium)
+    if not same_depth or (held_out.depth_m > 0 and medium != other):
         raise RefusedError(
-            f"{model.name} gives muons under {model.depth_m:g} m of {model.medium}, and the held-out ones are from "
-            f"under {held_out.depth_m:g} m of {held_out.medium}: compare muons of one place"
+            f"{model.name} gives muons under {model.depth_m:g} m of {medium}, and the held-out ones are from "
+            f"under {held_out.depth_m:g} m of {other}: compare muons of one place"
         )
 
 

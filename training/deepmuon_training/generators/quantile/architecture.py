@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,10 @@ import numpy as np
 
 from deepmuon_training.energy_transform import EnergyTransform
 from deepmuon_training.export.stored import StoredGenerator
+from deepmuon_training.families.rates import KnownRate
 from deepmuon_training.generators.architecture import Architecture, Azimuth, Fit
 from deepmuon_training.generators.quantile.azimuth_fit import AzimuthDensity
+from deepmuon_training.generators.quantile.family import QuantileFamily, quantile_family
 from deepmuon_training.generators.quantile.fit import QuantileSchedules, fit_quantile
 from deepmuon_training.generators.quantile.maps import QuantileGenerator
 from deepmuon_training.generators.quantile.tables import QuantileTables, table_error, tabulate
@@ -35,6 +38,7 @@ class _Quantile(Architecture[QuantileSchedules, QuantileGenerator]):
     name = "quantile"
     settings = QuantileSchedules
     checkpoints = ("charge.pt", "azimuth.pt", "zenith.pt")
+    makes_families = True
 
     def fit(
         self,
@@ -82,6 +86,11 @@ class _Quantile(Architecture[QuantileSchedules, QuantileGenerator]):
     def exportable(self, networks: QuantileGenerator, seed: int) -> tuple[QuantileTables, tuple[str, ...]]:
         tables = tabulate(networks)
         return tables, (str(table_error(networks, tables, seed=seed)),)
+
+    def family(
+        self, knots: Sequence[tuple[float, QuantileTables]], density: float, rates: Sequence[KnownRate]
+    ) -> QuantileFamily:
+        return quantile_family(knots, density, rates)
 
     def read_back(self, stored: StoredGenerator) -> QuantileTables:
         energy, zenith, charge = (stored.constants[f"{name}/table"] for name in ("energy", "zenith", "charge"))

@@ -41,6 +41,7 @@ __all__ = [
     "energy_logit",
     "energy_logits",
     "row_logits",
+    "row_place",
     "zenith_place",
 ]
 
@@ -106,15 +107,21 @@ def column_logits() -> torch.Tensor:
     return torch.linspace(-COLUMN_REACH, COLUMN_REACH, COLUMNS, dtype=torch.float64)
 
 
+def row_place(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the place of each t among the rows, 0 to 64: a row's own is its number."""
+    even = np.arcsinh(np.clip(t, -_ROW_REACH, _ROW_REACH) / _ROW_BEND) / np.arcsinh(_ROW_REACH / _ROW_BEND)
+    place: NDArray[np.float64] = (even + 1) / 2 * (ROWS - 1)
+    return place
+
+
 def _row_of_cell() -> NDArray[np.int8]:
     """Choose the row of each cell of energy, in the order of their numbers: 0, 1, ..., ..., -2, -1."""
     cell = np.concatenate([np.arange(ENERGY_CELLS), np.arange(1 - ENERGY_CELLS, 0)])
     t = (cell + np.sign(cell) / 2) / ENERGY_PER_UNIT
-    even = np.arcsinh(np.clip(t, -_ROW_REACH, _ROW_REACH) / _ROW_BEND) / np.arcsinh(_ROW_REACH / _ROW_BEND)
     period = 1 << _DITHER_BITS
     reversed_bits = np.array([int(f"{k:0{_DITHER_BITS}b}"[::-1], 2) for k in range(period)])
     threshold = (reversed_bits[cell % period] + 0.5) / period
-    row = np.floor((even + 1) / 2 * (ROWS - 1) + threshold)
+    row = np.floor(row_place(t) + threshold)
     rows: NDArray[np.int8] = np.clip(row, 0, ROWS - 1).astype(np.int8)
     return rows
 

@@ -1,0 +1,109 @@
+"""The card of a family: its knots, and its scores at and between them; in Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from deepmuon_training.export.metadata import Training
+from deepmuon_training.release.card import GENERAL_LIMITS, manifest_entry
+from deepmuon_training.scores.evaluation import Evaluation
+
+__all__ = ["family_card"]
+
+_HEADING = (
+    *("depth [m]", "", "generated", "held out", "KS energy", "KS cos zenith", "delta", "charge chi²/ndf", "AUC"),
+    "rate / held out",
+)
+
+
+def family_card(
+    model: Path,
+    knots: Sequence[Training],
+    evaluations: Mapping[float, Evaluation],
+    *,
+    command: str,
+    notes: Sequence[str],
+) -> str:
+    """Write the card of a released family.
+
+    Parameters
+    ----------
+    model
+        Its ONNX file.
+    knots
+        What each was trained on, ascending in depth.
+    evaluations
+        Against held-out muons, by depth in metres.
+    command
+        Makes the family again.
+    notes
+        What is particular to it.
+    """
+    said = manifest_entry(model)
+    range_ = f"{said['depth_min_m']} to {said['depth_max_m']} m"
+    depths = {knot.depth_m for knot in knots}
+    return "\n".join(
+        [
+            f"# {said['architecture']}, {range_} of {said['medium']}",
+            "",
+            f"Muons under any depth of {range_} of {said['medium']} ({knots[-1].medium} in Geant4), by the "
+            f"`{said['architecture']}` architecture: a family.",
+            "",
+            "| | |",
+            "|---|---|",
+            *(f"| {key} | {value} |" for key, value in said.items()),
+            "",
+            "## What made it",
+            "",
+            "| knot [m] | muons | rate [1/m² s] |",
+            "|---|---|---|",
+            *(f"| {knot.depth_m:g} | {knot.muons:,} | {_rate(knot)} |" for knot in knots),
+            "",
+            "The deepest knot's muons:",
+            "",
+            *(f"1. {step}" for step in knots[-1].provenance),
+            "",
+            "```",
+            command,
+            "```",
+            "",
+            "CRY is by Lawrence Livermore National Laboratory (UCRL-CODE-227323, BSD-style licence).",
+            "",
+            "## Scores",
+            "",
+            "Generated muons against held-out ones, which trained nothing, at knots and between them. KS less what one "
+            "pair of alike samples in a hundred exceeds; delta is the relative difference on CRY's cells beyond noise.",
+            "",
+            f"| {' | '.join(_HEADING)} |",
+            "|---" * len(_HEADING) + "|",
+            *(_row(depth, depth in depths, evaluations[depth]) for depth in sorted(evaluations)),
+            "",
+            "## Limits",
+            "",
+            *(f"- {limit}" for limit in (*notes, *GENERAL_LIMITS)),
+            "",
+        ]
+    )
+
+
+def _rate(knot: Training) -> str:
+    if knot.rate is None:
+        return "unknown"
+    return f"{knot.rate:.6g}" + ("" if knot.rate_uncertainty is None else f" ± {knot.rate_uncertainty:.2g}")
+
+
+def _row(depth: float, at_knot: bool, found: Evaluation) -> str:
+    rate = "" if found.rate is None else f"{found.rate.generated / found.rate.held_out:.4f}"
+    cells = [
+        f"{depth:g}",
+        "knot" if at_knot else "between",
+        f"{found.generated_muons:,}",
+        f"{found.held_out_muons:,}",
+        *(f"{found.ks[column].excess:+.4f}" for column in ("energy", "cos zenith")),
+        f"{found.cells.delta:.2%}",
+        f"{found.charge.per_ndf:.2f}",
+        f"{found.classifier.auc:.4f}",
+        rate,
+    ]
+    return f"| {' | '.join(cells)} |"
