@@ -177,6 +177,12 @@ def test_the_same_knots_give_the_same_bytes(file, family, knots, tmp_path):
     assert (tmp_path / "again.onnx").read_bytes() == file.read_bytes()
 
 
+def test_the_medium_is_that_of_its_depths_and_not_of_sea_level(family, knots, tmp_path):
+    rock = [replace(knot, medium="standard_rock 2.65 g/cm3") if knot.depth_m else knot for knot in knots]
+    export_family(family, rock, None, tmp_path / "family.onnx")
+    assert Generator.open(file=tmp_path / "family.onnx", device="cpu").model.medium == "rock"
+
+
 def test_an_unknown_rate_is_no_output(family, knots, tmp_path):
     export_family(replace(family, rates=None), knots, None, tmp_path / "family.onnx")
     assert len(onnx.load(tmp_path / "family.onnx").graph.output) == 3

@@ -26,20 +26,21 @@ def command(generators: tuple[Path, ...], output: Path, rates: Path | None, over
     """Write generators of several depths as one ONNX file, which has any depth from the first to the last.
 
     \b
-        $ deepmuon-train family 0m.pt 1m.pt 3m.pt 10m.pt 20m.pt -o water.onnx
-        water.onnx: quantile, 5 knots from 0 to 20 m of G4_WATER, 129.03 to 25.98 muons per m2 and s, 884,617 bytes
-        - The map of 10 m, interpolated from its neighbours, would differ by 1.9 % of the energy (rms) ...
+        $ deepmuon-train family 0m.pt 1m.pt 3m.pt -o water.onnx
+        water.onnx: quantile, 3 knots from 0 to 3 m of G4_WATER, 129.03 to 96.13 muons per m2 and s, 486,532 bytes
+        - Of the knots between the first and the last, that of 1 m is hardest to interpolate from its ...
+        - 0 m: Above 50 GeV, where the training sample thins out, the flux above E goes as E^-1.82, ...
         ...
-        $ deepmuon-gen --model water.onnx --depth 13.7 -n 1e6 -o muons.h5
+        $ deepmuon-gen --model water.onnx --depth 1.7 -n 1e6 -o muons.h5
 
     Each GENERATOR is what `fit` made of muons at one depth, a knot; there are two or more, in any order. They have one
     medium, one flux and one architecture, quantile with a uniform azimuth. Between knots the maps are interpolated, by
     the four nearest: muons of the same latents move smoothly with depth. Near the surface knots have to be dense, say
     0, 0.1, 0.3, 1, 3, 6 and 10 m, and each other's neighbours should be less than twice as deep further down. The notes
-    say what is missed where a knot is left out: between knots it is less. Score it there:
+    say what is missed where a knot is left out: between knots it should be less. Score it there:
 
     \b
-        deepmuon-train evaluate water.onnx held_out.h5 --depth 13.7 -o report.html
+        deepmuon-train evaluate water.onnx held_out.h5 --depth 1.7 -o report.html
 
     The rate at a knot is that of its training sample; --rates adds depths, or says what a sample does not, and is what
     counts where both know one. Between them the logarithm of the rate is a cubic spline. A pipeline's layers.csv can be

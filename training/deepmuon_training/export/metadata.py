@@ -6,15 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from importlib.metadata import version
 
-import numpy as np
-
+from deepmuon_runtime.model.family import depth_text
 from deepmuon_runtime.model.metadata import CONTRACT_VERSION
 from deepmuon_training.energy_transform import LAMBDA
 from deepmuon_training.export.exportable import Exportable, Family
 from deepmuon_training.medium import model_medium
 from deepmuon_training.sample import Sample
 
-__all__ = ["LICENCE", "Training", "depth_text", "family_metadata", "metadata"]
+__all__ = ["LICENCE", "Training", "family_metadata", "metadata"]
 
 LICENCE = "BSD-3-Clause"
 
@@ -87,6 +86,7 @@ def family_metadata(
     known = {"rate_relative_uncertainty": _short(rate_relative_uncertainty)}
     limits = [knot.zenith_max_deg for knot in knots if knot.zenith_max_deg is not None]
     together: dict[str, str | None] = {
+        "medium": model_medium(knots[-1].medium),  # at sea level there is none, whatever its name
         "training_source": "; ".join(dict.fromkeys(knot.source for knot in knots)),
         "training_muons": str(sum(knot.muons for knot in knots)),
         "zenith_max_deg": f"{max(limits):.6g}" if len(limits) == len(knots) else None,
@@ -121,11 +121,6 @@ def _texts(
         "training_seed": training.seed,
     }
     return {key: str(value) for key, value in known.items() if value is not None}
-
-
-def depth_text(depth_m: float) -> str:
-    """Return the shortest text of a depth as float32."""
-    return np.format_float_positional(np.float32(depth_m), trim="-")
 
 
 def _relative(rate: float | None, uncertainty: float | None) -> str | None:

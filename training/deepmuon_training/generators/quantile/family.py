@@ -108,7 +108,7 @@ class QuantileFamily:
         return (
             f"Of the knots between the first and the last, that of {depth:g} m is hardest to interpolate from its "
             f"neighbours: its muons would differ by {energy:.1%} of the energy and {cosine:.4f} of cos zenith (rms). "
-            "Between knots that is less.",
+            "Between knots it should be less.",
         )
 
     def graph(self) -> tuple[Graph, str, str, str, str | None]:
