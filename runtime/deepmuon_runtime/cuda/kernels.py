@@ -12,9 +12,9 @@ FILL_LATENTS = "fill_latents"
 """Arguments: seed, stream, first half-word, how many (uint64 each); latents (float32, out)."""
 
 TAKE_MUONS = "take_muons"
-"""Arguments: muons skipped, how many (uint64 each); energy, direction, charge of the network; lowest and highest energy,
-tolerance of a squared length (float32 each); energy, u, v, w, pdg_id (out); position of the first bad muon (uint64, of
-which the lowest is kept)."""
+"""Arguments: muons skipped, how many (uint64); energy, direction, charge of the network; lowest and highest energy,
+tolerance of a squared length (float32); energy, u, v, w, pdg_id (out); position of the first bad muon (uint64, the
+lowest is kept)."""
 
 THREADS = 256
 """Threads of a block of CUDA's."""
