@@ -124,23 +124,22 @@ def particles(columns: Columns) -> NDArray[Any]:
 
 def columns_of(new: NDArray[Any], types: Mapping[str, np.dtype[Any]]) -> Columns:
     """Return particles as columns of a muon file."""
-    first, second = new["first"].astype(np.float64), new["second"].astype(np.float64)
-    energy = new["energy"].astype(np.float64)
-    no_u, no_v = np.abs(first) > 1, np.abs(second) > 1
-    with np.errstate(divide="ignore", invalid="ignore"):  # whoever reads looks at what comes out
+    with np.errstate(all="ignore"):  # of damaged numbers, too: whoever reads looks at what comes out
+        first, second = new["first"].astype(np.float64), new["second"].astype(np.float64)
+        energy = new["energy"].astype(np.float64)
+        no_u, no_v = np.abs(first) > 1, np.abs(second) > 1
         w = np.where(no_u, 1 / first, np.where(no_v, 1 / second, 0.0))
         one, two = np.where(no_u, second, first), np.where(no_u | no_v, w, second)
         missing = np.copysign(np.sqrt(np.maximum(0.0, 1 - one * one - two * two)), energy)
-    found = {
-        "kinetic_energy": np.abs(energy) / MEV,
-        "u": np.where(no_u, missing, first),
-        "v": np.where(no_v, missing, second),
-        "w": np.where(no_u | no_v, w, missing),
-        "pdg_id": new["code"],
-        **{name: new["place"][:, axis].astype(np.float64) / CM for axis, name in enumerate(PLACE)},
-        "time": new["time"] / MS,
-    }
-    with np.errstate(over="ignore"):
+        found = {
+            "kinetic_energy": np.abs(energy) / MEV,
+            "u": np.where(no_u, missing, first),
+            "v": np.where(no_v, missing, second),
+            "w": np.where(no_u | no_v, w, missing),
+            "pdg_id": new["code"],
+            **{name: new["place"][:, axis].astype(np.float64) / CM for axis, name in enumerate(PLACE)},
+            "time": new["time"] / MS,
+        }
         return {name: found[name].astype(dtype) for name, dtype in types.items()}
 
 
