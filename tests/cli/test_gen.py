@@ -497,7 +497,7 @@ def test_an_option_that_is_misspelt_is_told_with_the_nearest_one(gen):
         ("--energy-min 1", "keep those you want when you read the file"),
         ("--material G4_ROCK", "deepmuon-train transport takes their muons through other materials"),
         ("--flux cry", "a model has its own"),
-        ("--csv", "the end of the name says the format: -o muons.mcpl"),
+        ("--csv", "the end of the file's name says its format: -o muons.mcpl"),
         ("--format text -o muons.h5", "'text' is not one of 'h5', 'mcpl', 'mcpl.gz', 'root', 'csv', 'csv.gz'"),
         ("--gpu", "write --device cuda"),
         ("--xyzzy", "deepmuon-gen --help lists"),
