@@ -20,12 +20,15 @@ import click
 from deepmuon_runtime.model.baking import bake
 from deepmuon_training.data.cry import HELD_OUT_CRY_MUONS, read_cry
 from deepmuon_training.data.smoothing import StepSmoother
+from deepmuon_training.export.metadata import Training
 from deepmuon_training.generators.family import family_of
 from deepmuon_training.generators.fit import fit_generator
 from deepmuon_training.generators.fitted import FittedGenerator
 from deepmuon_training.pipeline.step import Step, run_steps
+from deepmuon_training.release.card import card
 from deepmuon_training.release.family_card import family_card
 from deepmuon_training.release.vectors import muon_vectors
+from deepmuon_training.reports.pictures import draw_pictures
 from deepmuon_training.sample import Sample, read_sample, write_sample
 from deepmuon_training.scores.evaluation import Evaluation
 from deepmuon_training.scores.model_evaluation import evaluate_model
@@ -41,6 +44,8 @@ BAKED = (0, 10, 20, 30, 40, 50)
 AS_IT_IS = 10**3.4
 """From this energy [GeV] on muons are as CRY has them: the maps knew five such muons, and go on as a power law.
 In a larger set that would pass the energy where Geant4's tables end."""
+
+COMMAND = "python models/make_family.py --cry cry_sea_level.h5 --surfaces FOLDER --work work"
 
 Make = Callable[[Path, bool], None]
 
@@ -173,24 +178,37 @@ def _score(work: Path, model: Path, depth: float, evaluation: Path) -> Make:
 
 def release(work: Path) -> None:
     """Put the family, its scores and its card where they are released, and the files of single depths baked from it."""
-    model, released = work / f"{NAME}.onnx", RELEASED / f"{NAME}.onnx"
-    shutil.copyfile(model, released)
-    evaluations = {}
+    released = RELEASED / f"{NAME}.onnx"
+    shutil.copyfile(work / released.name, released)
     (EVALUATIONS / NAME).mkdir(exist_ok=True)
+    evaluations = {}
     for depth in TESTED:
         text = (work / "evaluations" / f"{depth:g}m.json").read_text(encoding="utf-8")
         (EVALUATIONS / NAME / f"{depth:g}m.json").write_text(text, encoding="utf-8")
         evaluations[float(depth)] = Evaluation.from_json(text)
     knots = [FittedGenerator.load(work / "generators" / f"{depth:g}m.pt").training for depth in KNOTS]
-    command = "python models/make_family.py --cry cry_sea_level.h5 --surfaces FOLDER --work work"
     notes = (work / "notes.txt").read_text(encoding="utf-8").splitlines()
-    card = family_card(released, knots, evaluations, command=command, notes=notes)
-    released.with_suffix(".md").write_text(card, encoding="utf-8")
-    for depth in BAKED:
-        fixed = RELEASED / f"quantile-{depth}m.onnx"
-        fixed.write_bytes(bake(released.read_bytes(), depth))
-        (VECTORS / f"{fixed.stem}.json").write_text(muon_vectors(fixed), encoding="utf-8")
+    text = family_card(released, knots, evaluations, command=COMMAND, notes=notes)
+    released.with_suffix(".md").write_text(text, encoding="utf-8")
+    for knot in knots:
+        if knot.depth_m in BAKED:
+            _release_baked(released, knot, evaluations[knot.depth_m], notes)
     write_manifest()
+
+
+def _release_baked(family: Path, knot: Training, evaluation: Evaluation, notes: list[str]) -> None:
+    """Bake the model of a knot, and put it where it is released, with its test vectors, scores, pictures and card."""
+    name, depth = f"quantile-{knot.depth_m:g}m", f"{knot.depth_m:g} m"
+    path = RELEASED / f"{name}.onnx"
+    path.write_bytes(bake(family.read_bytes(), knot.depth_m, name=family.name))
+    (VECTORS / f"{name}.json").write_text(muon_vectors(path), encoding="utf-8")
+    (EVALUATIONS / f"{name}.json").write_text(evaluation.to_json(), encoding="utf-8")
+    (EVALUATIONS / name).mkdir(exist_ok=True)
+    draw_pictures(evaluation, EVALUATIONS / name, title=f"quantile, {depth}")
+    its_own = [f"Baked from {family.name}: the scores are the family's at {depth}, of the same muons."]
+    its_own += [note.removeprefix(f"{depth}: ") for note in notes if note.startswith(f"{depth}: ")]
+    text = card(path, evaluation, command=COMMAND, provenance=knot.provenance, notes=its_own)
+    path.with_suffix(".md").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -253,6 +253,15 @@ def test_a_family_of_ones_own_takes_a_depth(gen, family_file):
     assert read_attributes("muons.h5")["model_sha256"] == hashlib.sha256(family_file.read_bytes()).hexdigest()
 
 
+def test_the_shards_of_a_depth_are_parts_of_its_muons(gen, family_file):
+    options = ["--model", family_file, "--depth", "13.7", "-n", "1000", "--seed", 7, "--shard", "2/3"]
+    code, _, err = gen(*options, "-o", "muons.h5")
+    assert (code, err) == (0, "")
+    whole = Generator.open(13.7, file=family_file).sample(1000, seed=7)
+    assert np.array_equal(read_muons("muons.h5").kinetic_energy, whole.kinetic_energy[333:666])
+    assert read_attributes("muons.h5")["depth_m"] == 13.7
+
+
 def test_a_depth_that_a_family_of_ones_own_has_not_is_refused_with_the_range(gen, family_file):
     code, out, err = gen("--model", family_file, "--depth", "-1", "-n", "10", "-o", "muons.h5")
     assert (code, out, files()) == (2, "", [])
