@@ -13,6 +13,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import click
@@ -40,6 +41,11 @@ NAME = "quantile-water"
 
 BAKED = (0, 10, 20, 30, 40, 50)
 """Depths [m] that are released as files of their own, too."""
+
+SURFACES = ("plane", "sphere")
+
+EVALUATED = tuple(product(map(float, TESTED), range(len(SURFACES))))
+"""Depths [m] and surfaces at which the family is scored."""
 
 AS_IT_IS = 10**3.4
 """From this energy [GeV] on muons are as CRY has them: the maps knew five such muons, and go on as a power law.
@@ -73,6 +79,11 @@ def main(cry: Path | None, surfaces: Path | None, work: Path, only_plan: bool) -
 def sample_file(work: Path, name: str) -> Path:
     """Where a sample, or a set at sea level, lies."""
     return work / "samples" / f"{name}.h5"
+
+
+def evaluation_name(depth: float, surface: int) -> str:
+    """Return the name of the file with the scores at a depth [m], of muons through a surface."""
+    return f"{depth:g}m.json" if surface == 0 else f"{depth:g}m-{SURFACES[surface]}.json"
 
 
 def sample_steps(cry: Path | None, surfaces: Path | None, work: Path) -> Iterator[Step]:
@@ -145,9 +156,10 @@ def family_steps(work: Path) -> Iterator[Step]:
         yield Step("fit", f"at {depth:g} m", generator, _fit(work, depth, generator))
     model = work / f"{NAME}.onnx"
     yield Step("family", f"{len(KNOTS)} generators", work / "notes.txt", _family(generators, model))
-    for depth in TESTED:
-        evaluation = work / "evaluations" / f"{depth:g}m.json"
-        yield Step("score", f"at {depth:g} m", evaluation, _score(work, model, depth, evaluation))
+    for depth, surface in EVALUATED:
+        evaluation = work / "evaluations" / evaluation_name(depth, surface)
+        what = f"at {depth:g} m, {SURFACES[surface]}"
+        yield Step("score", what, evaluation, _score(work, model, depth, surface, evaluation))
 
 
 def _fit(work: Path, depth: float, generator: Path) -> Make:
@@ -167,10 +179,10 @@ def _family(generators: list[Path], model: Path) -> Make:
     return make
 
 
-def _score(work: Path, model: Path, depth: float, evaluation: Path) -> Make:
+def _score(work: Path, model: Path, depth: float, surface: int, evaluation: Path) -> Make:
     def make(_: Path, progress: bool) -> None:
         held_out = read_sample(sample_file(work, sample_name("testing", depth)))
-        found = evaluate_model(model, held_out, EVALUATED_MUONS, seed=SEED, depth=depth)
+        found = evaluate_model(model, held_out, EVALUATED_MUONS, seed=SEED, depth=depth, surface=surface)
         evaluation.write_text(found.to_json(), encoding="utf-8")
 
     return make
@@ -182,17 +194,17 @@ def release(work: Path) -> None:
     shutil.copyfile(work / released.name, released)
     (EVALUATIONS / NAME).mkdir(exist_ok=True)
     evaluations = {}
-    for depth in TESTED:
-        text = (work / "evaluations" / f"{depth:g}m.json").read_text(encoding="utf-8")
-        (EVALUATIONS / NAME / f"{depth:g}m.json").write_text(text, encoding="utf-8")
-        evaluations[float(depth)] = Evaluation.from_json(text)
+    for place in EVALUATED:
+        text = (work / "evaluations" / evaluation_name(*place)).read_text(encoding="utf-8")
+        (EVALUATIONS / NAME / evaluation_name(*place)).write_text(text, encoding="utf-8")
+        evaluations[place] = Evaluation.from_json(text)
     knots = [FittedGenerator.load(work / "generators" / f"{depth:g}m.pt").training for depth in KNOTS]
     notes = (work / "notes.txt").read_text(encoding="utf-8").splitlines()
     text = family_card(released, knots, evaluations, command=COMMAND, notes=notes)
     released.with_suffix(".md").write_text(text, encoding="utf-8")
     for knot in knots:
         if knot.depth_m in BAKED:
-            _release_baked(released, knot, evaluations[knot.depth_m], notes)
+            _release_baked(released, knot, evaluations[knot.depth_m, 0], notes)
     write_manifest()
 
 
