@@ -14,6 +14,7 @@ import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import click
 
@@ -33,7 +34,33 @@ from deepmuon_training.transport.slab_file import transport_file
 from family_plan import CUT, KNOTS, PLAN, TESTED, Slab, Surface, sample_name
 from make import EVALUATED_MUONS, EVALUATIONS, RELEASED, SEED, VECTORS, write_manifest
 
-NAME = "quantile-water"
+
+class Family(NamedTuple):
+    """A family to be fitted, scored and released.
+
+    Parameters
+    ----------
+    name
+        Of its file.
+    flux
+        That its samples are of.
+    knots, tested
+        Depths [m] of its generators, and those at which it is scored.
+    command
+        That makes it.
+    """
+
+    name: str
+    flux: str
+    knots: tuple[float, ...]
+    tested: tuple[float, ...]
+    command: str
+
+
+CRY = Family(
+    "quantile-water", "cry", KNOTS, TESTED,
+    "python models/make_family.py --cry cry_sea_level.h5 --surfaces FOLDER --work work",
+)  # fmt: skip
 
 BAKED = (0, 10, 20, 30, 40, 50)
 """Depths [m] that are released as files of their own, too."""
@@ -60,9 +87,14 @@ def main(cry: Path | None, surfaces: Path | None, work: Path, only_plan: bool) -
         return
     for folder in (work / "samples", work / "generators", work / "evaluations"):
         folder.mkdir(parents=True, exist_ok=True)
-    steps = [*sample_steps(cry, surfaces, work), *family_steps(work)]
+    steps = [*sample_steps(cry, surfaces, work), *family_steps(work, CRY)]
     run_steps(steps, click.echo)
-    release(work)
+    release(work, CRY)
+    for depth in BAKED:
+        fixed = RELEASED / f"quantile-{depth}m.onnx"
+        fixed.write_bytes(bake((RELEASED / f"{CRY.name}.onnx").read_bytes(), depth))
+        (VECTORS / f"{fixed.stem}.json").write_text(muon_vectors(fixed), encoding="utf-8")
+    write_manifest()
 
 
 def sample_file(work: Path, name: str) -> Path:
@@ -133,21 +165,21 @@ def _carry(work: Path, slab: Slab) -> Make:
     return make
 
 
-def family_steps(work: Path) -> Iterator[Step]:
+def family_steps(work: Path, family: Family) -> Iterator[Step]:
     """Yield the steps that fit the knots, make the family, and score it at each depth."""
-    generators = [work / "generators" / f"{depth:g}m.pt" for depth in KNOTS]
-    for depth, generator in zip(KNOTS, generators, strict=True):
-        yield Step("fit", f"at {depth:g} m", generator, _fit(work, depth, generator))
-    model = work / f"{NAME}.onnx"
-    yield Step("family", f"{len(KNOTS)} generators", work / "notes.txt", _family(generators, model))
-    for depth in TESTED:
+    generators = [work / "generators" / f"{depth:g}m.pt" for depth in family.knots]
+    for depth, generator in zip(family.knots, generators, strict=True):
+        yield Step("fit", f"at {depth:g} m", generator, _fit(work, family, depth, generator))
+    model = work / f"{family.name}.onnx"
+    yield Step("family", f"{len(family.knots)} generators", work / "notes.txt", _family(generators, model))
+    for depth in family.tested:
         evaluation = work / "evaluations" / f"{depth:g}m.json"
         yield Step("score", f"at {depth:g} m", evaluation, _score(work, model, depth, evaluation))
 
 
-def _fit(work: Path, depth: float, generator: Path) -> Make:
+def _fit(work: Path, family: Family, depth: float, generator: Path) -> Make:
     def make(saved: Path, progress: bool) -> None:
-        sample = replace(read_sample(sample_file(work, sample_name("training", depth))), flux="cry")
+        sample = replace(read_sample(sample_file(work, sample_name("training", depth))), flux=family.flux)
         fit_generator(sample, "quantile", seed=SEED, checkpoint_folder=saved, progress=progress).save(generator)
 
     return make
@@ -171,26 +203,20 @@ def _score(work: Path, model: Path, depth: float, evaluation: Path) -> Make:
     return make
 
 
-def release(work: Path) -> None:
-    """Put the family, its scores and its card where they are released, and the files of single depths baked from it."""
-    model, released = work / f"{NAME}.onnx", RELEASED / f"{NAME}.onnx"
+def release(work: Path, family: Family) -> None:
+    """Put a family, its scores and its card where they are released."""
+    model, released = work / f"{family.name}.onnx", RELEASED / f"{family.name}.onnx"
     shutil.copyfile(model, released)
     evaluations = {}
-    (EVALUATIONS / NAME).mkdir(exist_ok=True)
-    for depth in TESTED:
+    (EVALUATIONS / family.name).mkdir(exist_ok=True)
+    for depth in family.tested:
         text = (work / "evaluations" / f"{depth:g}m.json").read_text(encoding="utf-8")
-        (EVALUATIONS / NAME / f"{depth:g}m.json").write_text(text, encoding="utf-8")
+        (EVALUATIONS / family.name / f"{depth:g}m.json").write_text(text, encoding="utf-8")
         evaluations[float(depth)] = Evaluation.from_json(text)
-    knots = [FittedGenerator.load(work / "generators" / f"{depth:g}m.pt").training for depth in KNOTS]
-    command = "python models/make_family.py --cry cry_sea_level.h5 --surfaces FOLDER --work work"
+    knots = [FittedGenerator.load(work / "generators" / f"{depth:g}m.pt").training for depth in family.knots]
     notes = (work / "notes.txt").read_text(encoding="utf-8").splitlines()
-    card = family_card(released, knots, evaluations, command=command, notes=notes)
+    card = family_card(released, knots, evaluations, command=family.command, notes=notes)
     released.with_suffix(".md").write_text(card, encoding="utf-8")
-    for depth in BAKED:
-        fixed = RELEASED / f"quantile-{depth}m.onnx"
-        fixed.write_bytes(bake(released.read_bytes(), depth))
-        (VECTORS / f"{fixed.stem}.json").write_text(muon_vectors(fixed), encoding="utf-8")
-    write_manifest()
 
 
 if __name__ == "__main__":
