@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 from typing import Any
-from zlib import crc32
 
 import h5py
 import numpy as np
@@ -18,7 +17,7 @@ from deepmuon_runtime.memory_limit import is_limited
 from deepmuon_runtime.model.metadata import Model
 from deepmuon_runtime.model.released import list_models, read_released
 from deepmuon_runtime.muon_file.attributes import attribute_defects, checksum_defects, is_generated, sound_attributes
-from deepmuon_runtime.muon_file.checksum import unlike
+from deepmuon_runtime.muon_file.checksum import crc32, unlike
 from deepmuon_runtime.muon_file.columns import (
     columns_of,
     missing_columns,

@@ -11,7 +11,6 @@ from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
-from zlib import crc32
 
 import h5py
 import numpy as np
@@ -34,6 +33,7 @@ from deepmuon_runtime.muon_file.format import (
     python_value,
     stated,
 )
+from deepmuon_runtime.muon_file.growing_column import GrowingColumn
 from deepmuon_runtime.muon_file.output import check_muon_output
 from deepmuon_runtime.muon_file.reader import opened
 from deepmuon_runtime.muon_file.virtual import Source, VirtualColumn, create_virtual_column
@@ -126,8 +126,9 @@ class MuonWriter:
         for defect in _defects(self._attributes):
             raise RefusedError(f"{path} was not written: {defect}")
         self._types = {**COLUMNS, **{name: OPTIONAL_COLUMNS[name] for name in OPTIONAL_COLUMNS if name in optional}}
-        self._columns: dict[str, h5py.Dataset] = {}
-        self._checksums = dict.fromkeys(self._types, 0)
+        self._growing: dict[str, GrowingColumn] = {}
+        self._columns: dict[str, h5py.Dataset] = {}  # complete ones, and their checksums
+        self._checksums: dict[str, int] = {}
 
     def __enter__(self) -> MuonWriter:
         """Create the temporary file."""
@@ -207,20 +208,15 @@ class MuonWriter:
         self._backing = QuietFile(str(self._partial.path))
         self._partial.hold(self._backing.fileno())
         self._flush = EarlyFlush(self._backing.fileno())
-        # Whole chunks go straight to the file: a cache would only copy them once more.
-        self._file = h5py.File(self._backing, "w", rdcc_nbytes=0)
+        self._file = h5py.File(self._backing, "w", rdcc_nbytes=0)  # nothing is read again
 
     def _append(self, columns: Mapping[str, ArrayLike]) -> None:
         length = len(np.asarray(columns["pdg_id"]))
-        if not self._columns:
+        if not self._growing:
             self._create_columns(length)
-        end = self.count + length
-        for name, column in self._columns.items():
-            values = np.ascontiguousarray(columns[name], self._types[name][0])
-            column.resize((end,))
-            column[self.count : end] = values
-            self._checksums[name] = crc32(values.data, self._checksums[name])
-        self.count = end
+        for name, column in self._growing.items():
+            column.append(columns[name])
+        self.count += length
         self._raise_fault()
         self._flush.wrote(length * bytes_per_muon(self._types))
 
@@ -228,7 +224,7 @@ class MuonWriter:
         chunk = min(max(first_length, SMALLEST_CHUNK), LARGEST_CHUNK)
         group = self._file.create_group("muons")
         for name, (dtype, _) in self._types.items():
-            self._columns[name] = group.create_dataset(name, shape=(0,), maxshape=(None,), chunks=(chunk,), dtype=dtype)
+            self._growing[name] = GrowingColumn(group, name, dtype, chunk)
 
     def _refer(self, paths: Iterable[str | Path], progress: Callable[[int], object]) -> None:
         parts = []
@@ -262,8 +258,11 @@ class MuonWriter:
 
     def _finish(self) -> None:
         """Write the attributes, and all that is in memory to the disk."""
-        if not self._columns:
+        if not self._columns and not self._growing:
             self._create_columns(0)
+        for name, growing in self._growing.items():
+            growing.finish()
+            self._columns[name], self._checksums[name] = growing.dataset, growing.checksum
         for name, column in self._columns.items():
             column.attrs["units"] = self._types[name][1]
             column.attrs[CHECKSUM] = np.uint32(self._checksums[name])

@@ -525,6 +525,20 @@ def test_the_checksum_of_a_column_is_that_of_its_bytes_however_they_came(tmp_pat
     assert checksums(tmp_path / "muons.h5") == {name: crc32(getattr(muons, name).tobytes()) for name in COLUMNS}
 
 
+def test_only_the_last_chunk_of_a_file_is_not_full_however_the_muons_came(tmp_path):
+    """That one holds zeros after the muons, which nobody reads."""
+    muons = some_muons(9000)
+    with MuonWriter(tmp_path / "muons.h5", PLANE) as writer:
+        for first, end in ((0, 2500), (2500, 2501), (2501, 8000), (8000, 9000)):
+            writer.append(muons[first:end])
+    with h5py.File(tmp_path / "muons.h5") as file:
+        for column in file["muons"].values():
+            assert (column.chunks, column.id.get_num_chunks()) == ((2500,), 4)
+            mask, last = column.id.read_direct_chunk((7500,))
+            assert (mask, last[-1000 * column.dtype.itemsize :]) == (0, bytes(1000 * column.dtype.itemsize))
+    assert are_equal(read_muons(tmp_path / "muons.h5"), muons)
+
+
 def test_muons_of_another_type_or_order_in_memory_are_written_as_the_format_says(tmp_path):
     muons = some_muons(100)
     wide = Muons(**{name: np.repeat(getattr(muons, name).astype(float), 2)[::2] for name in COLUMNS})
