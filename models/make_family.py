@@ -10,50 +10,31 @@ nor what they alone would need, and an interrupted step goes on. Most of the tim
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Callable, Iterator
-from dataclasses import replace
-from itertools import product
+from collections.abc import Iterator
 from pathlib import Path
 
 import click
 
-from deepmuon_runtime.model.baking import bake
 from deepmuon_training.data.cry import HELD_OUT_CRY_MUONS, read_cry
 from deepmuon_training.data.smoothing import StepSmoother
-from deepmuon_training.export.metadata import Training
-from deepmuon_training.generators.family import family_of
-from deepmuon_training.generators.fit import fit_generator
-from deepmuon_training.generators.fitted import FittedGenerator
 from deepmuon_training.pipeline.step import Step, run_steps
-from deepmuon_training.release.card import card
-from deepmuon_training.release.family_card import family_card
-from deepmuon_training.release.vectors import muon_vectors
-from deepmuon_training.reports.pictures import draw_pictures
 from deepmuon_training.sample import Sample, read_sample, write_sample
-from deepmuon_training.scores.evaluation import Evaluation
-from deepmuon_training.scores.model_evaluation import evaluate_model
 from deepmuon_training.transport.slab_file import transport_file
 from family_plan import CUT, KNOTS, PLAN, TESTED, Slab, Surface, sample_name
-from make import EVALUATED_MUONS, EVALUATIONS, RELEASED, SEED, VECTORS, write_manifest
+from released_family import Family, Make, family_steps, make_folders, release, sample_file
 
-NAME = "quantile-water"
-
-BAKED = (0, 10, 20, 30, 40, 50)
-"""Depths [m] that are released as files of their own, too."""
-
-SURFACES = ("plane", "sphere")
-
-EVALUATED = tuple(product(map(float, TESTED), range(len(SURFACES))))
-"""Depths [m] and surfaces at which the family is scored."""
+CRY = Family(
+    name="quantile-water",
+    flux="cry",
+    knots=KNOTS,
+    tested=TESTED,
+    command="python models/make_family.py --cry cry_sea_level.h5 --surfaces FOLDER --work work",
+    baked=(0, 10, 20, 30, 40, 50),
+)
 
 AS_IT_IS = 10**3.4
 """From this energy [GeV] on muons are as CRY has them: the maps knew five such muons, and go on as a power law.
 In a larger set that would pass the energy where Geant4's tables end."""
-
-COMMAND = "python models/make_family.py --cry cry_sea_level.h5 --surfaces FOLDER --work work"
-
-Make = Callable[[Path, bool], None]
 
 
 @click.command(help=__doc__)
@@ -69,21 +50,9 @@ def main(cry: Path | None, surfaces: Path | None, work: Path, only_plan: bool) -
                 kept = f", E |w| of {CUT * step.cut_m:g} GeV and more" if step.cut_m else ""
                 click.echo(f"{step.name}.h5: {step.muons:,} muons of CRY, seeds from {step.seed} on{kept}")
         return
-    for folder in (work / "samples", work / "generators", work / "evaluations"):
-        folder.mkdir(parents=True, exist_ok=True)
-    steps = [*sample_steps(cry, surfaces, work), *family_steps(work)]
-    run_steps(steps, click.echo)
-    release(work)
-
-
-def sample_file(work: Path, name: str) -> Path:
-    """Where a sample, or a set at sea level, lies."""
-    return work / "samples" / f"{name}.h5"
-
-
-def evaluation_name(depth: float, surface: int) -> str:
-    """Return the name of the file with the scores at a depth [m], of muons through a surface."""
-    return f"{depth:g}m.json" if surface == 0 else f"{depth:g}m-{SURFACES[surface]}.json"
+    make_folders(work)
+    run_steps([*sample_steps(cry, surfaces, work), *family_steps(work, CRY)], click.echo)
+    release(work, CRY)
 
 
 def sample_steps(cry: Path | None, surfaces: Path | None, work: Path) -> Iterator[Step]:
@@ -147,80 +116,6 @@ def _carry(work: Path, slab: Slab) -> Make:
         )
 
     return make
-
-
-def family_steps(work: Path) -> Iterator[Step]:
-    """Yield the steps that fit the knots, make the family, and score it at each depth."""
-    generators = [work / "generators" / f"{depth:g}m.pt" for depth in KNOTS]
-    for depth, generator in zip(KNOTS, generators, strict=True):
-        yield Step("fit", f"at {depth:g} m", generator, _fit(work, depth, generator))
-    model = work / f"{NAME}.onnx"
-    yield Step("family", f"{len(KNOTS)} generators", work / "notes.txt", _family(generators, model))
-    for depth, surface in EVALUATED:
-        evaluation = work / "evaluations" / evaluation_name(depth, surface)
-        what = f"at {depth:g} m, {SURFACES[surface]}"
-        yield Step("score", what, evaluation, _score(work, model, depth, surface, evaluation))
-
-
-def _fit(work: Path, depth: float, generator: Path) -> Make:
-    def make(saved: Path, progress: bool) -> None:
-        sample = replace(read_sample(sample_file(work, sample_name("training", depth))), flux="cry")
-        fit_generator(sample, "quantile", seed=SEED, checkpoint_folder=saved, progress=progress).save(generator)
-
-    return make
-
-
-def _family(generators: list[Path], model: Path) -> Make:
-    def make(_: Path, progress: bool) -> None:
-        family = family_of([FittedGenerator.load(path) for path in generators])
-        mismatch = family.export(model, overwrite=True)
-        (model.parent / "notes.txt").write_text("\n".join((*family.notes, mismatch.note)) + "\n", encoding="utf-8")
-
-    return make
-
-
-def _score(work: Path, model: Path, depth: float, surface: int, evaluation: Path) -> Make:
-    def make(_: Path, progress: bool) -> None:
-        held_out = read_sample(sample_file(work, sample_name("testing", depth)))
-        found = evaluate_model(model, held_out, EVALUATED_MUONS, seed=SEED, depth=depth, surface=surface)
-        evaluation.write_text(found.to_json(), encoding="utf-8")
-
-    return make
-
-
-def release(work: Path) -> None:
-    """Put the family, its scores and its card where they are released, and the files of single depths baked from it."""
-    released = RELEASED / f"{NAME}.onnx"
-    shutil.copyfile(work / released.name, released)
-    (EVALUATIONS / NAME).mkdir(exist_ok=True)
-    evaluations = {}
-    for place in EVALUATED:
-        text = (work / "evaluations" / evaluation_name(*place)).read_text(encoding="utf-8")
-        (EVALUATIONS / NAME / evaluation_name(*place)).write_text(text, encoding="utf-8")
-        evaluations[place] = Evaluation.from_json(text)
-    knots = [FittedGenerator.load(work / "generators" / f"{depth:g}m.pt").training for depth in KNOTS]
-    notes = (work / "notes.txt").read_text(encoding="utf-8").splitlines()
-    text = family_card(released, knots, evaluations, command=COMMAND, notes=notes)
-    released.with_suffix(".md").write_text(text, encoding="utf-8")
-    for knot in knots:
-        if knot.depth_m in BAKED:
-            _release_baked(released, knot, evaluations[knot.depth_m, 0], notes)
-    write_manifest()
-
-
-def _release_baked(family: Path, knot: Training, evaluation: Evaluation, notes: list[str]) -> None:
-    """Bake the model of a knot, and put it where it is released, with its test vectors, scores, pictures and card."""
-    name, depth = f"quantile-{knot.depth_m:g}m", f"{knot.depth_m:g} m"
-    path = RELEASED / f"{name}.onnx"
-    path.write_bytes(bake(family.read_bytes(), knot.depth_m, name=family.name))
-    (VECTORS / f"{name}.json").write_text(muon_vectors(path), encoding="utf-8")
-    (EVALUATIONS / f"{name}.json").write_text(evaluation.to_json(), encoding="utf-8")
-    (EVALUATIONS / name).mkdir(exist_ok=True)
-    draw_pictures(evaluation, EVALUATIONS / name, title=f"quantile, {depth}")
-    its_own = [f"Baked from {family.name}: the scores are the family's at {depth}, of the same muons."]
-    its_own += [note.removeprefix(f"{depth}: ") for note in notes if note.startswith(f"{depth}: ")]
-    text = card(path, evaluation, command=COMMAND, provenance=knot.provenance, notes=its_own)
-    path.with_suffix(".md").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
