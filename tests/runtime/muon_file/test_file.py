@@ -155,12 +155,12 @@ def test_a_file_that_is_replaced_keeps_its_mode(tmp_path, mode):
 @pytest.mark.parametrize(
     ("name", "advice"),
     [
-        ("muons.csv", "write muons.h5, and then deepmuon-csv muons.h5 -o muons.csv"),
-        ("muons.CSV", "write muons.h5, and then deepmuon-csv muons.h5 -o muons.CSV"),
-        ("muons.root", "write muons.h5, and then read it in Python with deepmuon_runtime.read_muons"),
-        ("muons.parquet", "write muons.h5, and then read it in Python"),
-        ("muons.mcpl", "write muons.h5, and then read it in Python"),
-        ("muons.mcpl.gz", "write muons.mcpl.h5, and then compress that"),
+        ("muons.csv", "write muons.h5, and then deepmuon-convert muons.h5 muons.csv"),
+        ("muons.CSV", "write muons.h5, and then deepmuon-convert muons.h5 muons.CSV"),
+        ("muons.root", "write muons.h5, and then deepmuon-convert muons.h5 muons.root"),
+        ("muons.parquet", "write muons.h5, and then read it in Python with deepmuon_runtime.read_muons"),
+        ("muons.mcpl", "write muons.h5, and then deepmuon-convert muons.h5 muons.mcpl"),
+        ("muons.mcpl.gz", "write muons.h5, and then deepmuon-convert muons.h5 muons.mcpl.gz"),
         ("muons.png", "deepmuon-plot muons.h5 -o muons.png"),
     ],
 )
