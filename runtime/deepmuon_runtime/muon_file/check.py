@@ -19,6 +19,7 @@ from deepmuon_runtime.model.metadata import Model
 from deepmuon_runtime.model.released import list_models, read_released
 from deepmuon_runtime.muon_file.attributes import attribute_defects, checksum_defects, is_generated, sound_attributes
 from deepmuon_runtime.muon_file.checksum import unlike
+from deepmuon_runtime.muon_file.choice import cuts_of, target_of_file
 from deepmuon_runtime.muon_file.columns import (
     columns_of,
     missing_columns,
@@ -234,7 +235,8 @@ def _examine_muons(columns: dict[str, _Column], report: Report, progress: Callab
     model = report.model
     energies = POSITIVE_ENERGIES if model is None else (model.energy_min_gev, model.energy_max_gev)
     faults: dict[str, _Faulty] = {}
-    places_and_times = PlacesAndTimes(report.attributes.get("live_time_s"))
+    cuts = cuts_of(report.attributes)
+    places_and_times = PlacesAndTimes(report.attributes.get("live_time_s"), target_of_file(report.attributes))
     total = len(columns["pdg_id"])
     for first in range(0, total, PIECE):
         span = slice(first, min(first + PIECE, total))
@@ -246,7 +248,8 @@ def _examine_muons(columns: dict[str, _Column], report: Report, progress: Callab
         muons = Muons(**{name: values[name] for name in COLUMNS})
         report.add(muons)
         unphysical = ((explain(fault, *energies), bad) for fault, bad in find_unphysical(muons, *energies).items())
-        for fault, bad in chain(unphysical, places_and_times.faults(values)):
+        outside = [("is outside the cuts", ~cuts.keeps(muons))] if cuts else []
+        for fault, bad in chain(unphysical, outside, places_and_times.faults(values)):
             if bad.any():
                 index = int(np.argmax(bad))
                 known = faults.setdefault(fault, _Faulty(first + index, describe(muons, index)))
