@@ -16,6 +16,7 @@ from deepmuon_runtime.latents.philox import LARGEST_SEED
 from deepmuon_runtime.latents.shard import Shard
 from deepmuon_runtime.model.metadata import Model, are_one_rate, is_name
 from deepmuon_runtime.muon_file.checksum import attributes_crc32, unlike
+from deepmuon_runtime.muon_file.choice import choice_defects
 from deepmuon_runtime.muon_file.format import ATTRIBUTES_CHECKSUM, python_value
 
 __all__ = [
@@ -177,7 +178,7 @@ def attribute_defects(attributes: Mapping[str, Any], model: Model | None) -> Ite
     sound = sound_attributes(attributes)
     yield from _shard_defects(sound)
     yield from _live_time_defects(sound)
-    yield from _choice_defects(sound)
+    yield from choice_defects(sound)
     if model is not None:
         yield from _model_defects(sound, model)
 
@@ -210,23 +211,38 @@ def _live_time_defects(sound: Mapping[str, Any]) -> Iterator[str]:
             yield f"the attribute {rate} is 0, and count is {sound['count']}"
 
 
-def _choice_defects(sound: Mapping[str, Any]) -> Iterator[str]:
-    for low, high in (("energy_min_gev", "energy_max_gev"), ("zenith_min_degrees", "zenith_max_degrees")):
-        if {low, high} <= sound.keys() and sound[low] >= sound[high]:
-            yield f"{low} is {sound[low]!r}, and should be below {high}, which is {sound[high]!r}"
-    if "target_size_m" in sound and "target" not in sound:
-        yield "target_size_m goes with target, which is not there"
-
-
 def _model_defects(sound: Mapping[str, Any], model: Model) -> Iterator[str]:
     if "depth_m" in sound and model.is_family and not model.has_depth(sound["depth_m"]):
         yield f"the attribute depth_m is {sound['depth_m']:g}, and its model {model.name} has {model.depths}"
         return
-    for name in ("depth_m", "medium", "architecture", "rate_hz_per_m2", "rate_uncertainty_hz_per_m2"):
+    for name in ("depth_m", "medium", "architecture"):
         expected, found = getattr(model, name), sound.get(name)
-        if model.is_family and "rate" in name and found and expected and are_one_rate(found, expected):
-            continue  # of another type of CPU
         if found != expected:
+            yield f"the attribute {name} is {_shown(found)}, and that of its model {model.name} is {_shown(expected)}"
+    yield from _rate_defects(sound, model)
+
+
+def _rate_defects(sound: Mapping[str, Any], model: Model) -> Iterator[str]:
+    """Yield how the rates are not those of the model."""
+    rate, kept = model.rate_hz_per_m2, sound.get("fraction_kept", 1.0)
+    if "target" in sound:
+        found = sound.get("target_rate_hz")
+        expected = (rate or 0.0) * math.prod(sound.get("target_size_m", [])) * kept
+        if rate and sound["target"] == "plane" and not (found and are_one_rate(found, expected)):
+            yield (
+                f"the attribute target_rate_hz is {_shown(found)}, and the rate of its model {model.name} makes "
+                f"{expected:.5g}"
+            )
+        return
+    for name in ("rate_hz_per_m2", "rate_uncertainty_hz_per_m2"):
+        expected, found = getattr(model, name), sound.get(name)
+        if "fraction_kept" in sound:
+            if name == "rate_hz_per_m2" and expected and not (found and are_one_rate(found, expected * kept)):
+                yield (
+                    f"the attribute {name} is {_shown(found)}, and that of its model {model.name}, "
+                    f"{_shown(expected)}, makes {expected * kept:.5g} with fraction_kept"
+                )
+        elif found != expected and not (model.is_family and found and expected and are_one_rate(found, expected)):
             yield f"the attribute {name} is {_shown(found)}, and that of its model {model.name} is {_shown(expected)}"
 
 

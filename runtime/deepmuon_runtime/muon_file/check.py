@@ -18,6 +18,7 @@ from deepmuon_runtime.model.metadata import Model
 from deepmuon_runtime.model.released import list_models, read_released
 from deepmuon_runtime.muon_file.attributes import attribute_defects, checksum_defects, is_generated, sound_attributes
 from deepmuon_runtime.muon_file.checksum import crc32, unlike
+from deepmuon_runtime.muon_file.choice import cuts_of, target_of_file
 from deepmuon_runtime.muon_file.columns import (
     columns_of,
     missing_columns,
@@ -267,13 +268,15 @@ def examine_muons(
     if model is not None and rounding:
         energies = energies[0] * (1 - rounding), energies[1] * (1 + rounding)
     faults: dict[str, _Faulty] = {}
-    places_and_times = PlacesAndTimes(report.attributes.get("live_time_s"))
+    cuts = cuts_of(report.attributes)
+    places_and_times = PlacesAndTimes(report.attributes.get("live_time_s"), target_of_file(report.attributes))
     first = 0
     for values in pieces:
         muons = Muons(**{name: values[name] for name in COLUMNS})
         report.add(muons)
         unphysical = ((explain(fault, *energies), bad) for fault, bad in find_unphysical(muons, *energies).items())
-        for fault, bad in chain(unphysical, places_and_times.faults(values)):
+        outside = [("is outside the cuts", ~cuts.keeps(muons, rounding))] if cuts else []
+        for fault, bad in chain(unphysical, outside, places_and_times.faults(values)):
             if bad.any():
                 index = int(np.argmax(bad))
                 known = faults.setdefault(fault, _Faulty(first + index, describe(muons, index)))

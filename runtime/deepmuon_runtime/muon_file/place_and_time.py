@@ -1,4 +1,4 @@
-"""Whether places and times can be those of muons that came one after the other."""
+"""Whether places and times can be those of muons that hit a target one after the other."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime.muon_file.format import PLACE
+from deepmuon_runtime.targets.target import Target
 
 __all__ = ["PlacesAndTimes"]
 
@@ -20,9 +21,12 @@ class PlacesAndTimes:
     ----------
     live_time
         The seconds in which the muons came, where that is known.
+    target
+        What all of them hit, where that is known.
     """
 
-    def __init__(self, live_time: float | None) -> None:
+    def __init__(self, live_time: float | None, target: Target | None) -> None:
+        self._target = target
         self._end = np.inf if live_time is None else live_time
         self._latest = 0.0
 
@@ -37,6 +41,12 @@ class PlacesAndTimes:
         place = [columns[name] for name in PLACE if name in columns]
         if place:
             yield "has a place that is not finite", ~np.isfinite(np.stack(place)).all(axis=0)
+        if place and self._target is not None:
+            direction = [columns[name].astype(float) for name in ("u", "v", "w")]
+            with np.errstate(all="ignore"):  # the file may hold anything
+                touches = self._target.touches(*(part.astype(float) for part in place), *direction)
+            where = "on" if self._target.surface == 0 else "where it enters"
+            yield f"is not {where} the {self._target.name}", ~touches
         time = columns.get("time")
         if time is not None and len(time):
             before = np.concatenate([[self._latest], time[:-1]])

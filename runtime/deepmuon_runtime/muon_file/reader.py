@@ -27,9 +27,9 @@ from deepmuon_runtime.muon_file.columns import (
 from deepmuon_runtime.muon_file.damage import READ_ERRORS, member
 from deepmuon_runtime.muon_file.format import (
     ATTRIBUTES_CHECKSUM,
-    BYTES_PER_MUON,
     CHECKSUM,
     COLUMNS,
+    bytes_per_muon,
     check_format,
     stated,
 )
@@ -59,7 +59,7 @@ def read_muons(path: str | Path, first: int = 0, count: int | None = None) -> Mu
 
     Returns
     -------
-    Muons [count]
+    Muons [count], with places and times where the file has them.
 
     Raises
     ------
@@ -72,8 +72,9 @@ def read_muons(path: str | Path, first: int = 0, count: int | None = None) -> Mu
         end = total if count is None else first + count
         if not 0 <= first <= end <= total:
             raise RefusedError(f"{path} holds {total} muons: those from {first} to {end} can't be read")
-        check_memory((end - first) * BYTES_PER_MUON, f"{end - first:,} muons of {path}", "read them in parts")
-        columns = file.read(first, end)
+        size = (end - first) * bytes_per_muon(file.columns)
+        check_memory(size, f"{end - first:,} muons of {path}", "read them in parts")
+        columns = file.read(first, end, file.columns)
         if (first, end) == (0, total):
             for name, column in columns.items():
                 file.verify(name, crc32(column.data))
@@ -92,7 +93,7 @@ def read_pieces(path: str | Path, size: int) -> Iterator[Muons]:
 
     Yields
     ------
-    Muons [size], and fewer at the end.
+    Muons [size], and fewer at the end, with places and times where the file has them.
 
     Raises
     ------
@@ -101,7 +102,7 @@ def read_pieces(path: str | Path, size: int) -> Iterator[Muons]:
         makes something of them should not let it be seen before the end.
     """
     with opened(path) as file:
-        for columns in file.pieces(size):
+        for columns in file.pieces(size, file.columns):
             yield Muons(**columns)
 
 

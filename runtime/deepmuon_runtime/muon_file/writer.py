@@ -111,14 +111,14 @@ class MuonWriter:
         return self
 
     def append(self, muons: Muons) -> None:
-        """Write muons, to a file without optional columns, after those already written.
+        """Write muons, with the columns of the file, after those already written.
 
         Raises
         ------
         FailedError
             If they can't be written, for instance on a full disk.
         """
-        self.append_columns(vars(muons))
+        self.append_columns(muons.columns)
 
     def append_columns(self, columns: Mapping[str, ArrayLike]) -> None:
         """Write muons, as all columns of the file by their names, after those already written.
@@ -278,7 +278,7 @@ def write_muons(path: str | Path, muons: Muons, attributes: Mapping[str, object]
     RefusedError, FailedError
         As for `MuonWriter`.
     """
-    with MuonWriter(path, attributes, overwrite) as writer:
+    with MuonWriter(path, attributes, overwrite, optional=muons.columns.keys() - COLUMNS) as writer:
         writer.append(muons)
 
 

@@ -16,9 +16,12 @@ from deepmuon_training.generators.quantile.azimuth_table import azimuth_turn_gra
 from deepmuon_training.generators.quantile.cells import ENERGY_PER_UNIT, FINE_STEP, HORIZON_WEIGHT, ZENITH_CELLS
 from deepmuon_training.generators.quantile.look_ups import look_ups_graph
 
-__all__ = ["LATENT_SIZE", "NEAREST_HORIZON", "quantile_graph"]
+__all__ = ["ENERGY_LATENTS", "LATENT_SIZE", "NEAREST_HORIZON", "quantile_graph"]
 
 LATENT_SIZE = 5
+
+ENERGY_LATENTS = (0, 1)
+"""The coarse and the fine one of the energy, by the contract."""
 
 NEAREST_HORIZON = 2.0**-20
 """Smallest cos zenith: no muon is horizontal, or goes up."""

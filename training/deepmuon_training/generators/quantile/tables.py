@@ -37,7 +37,7 @@ from deepmuon_training.generators.quantile.cells import (
     row_logits,
     zenith_square,
 )
-from deepmuon_training.generators.quantile.graph import LATENT_SIZE, NEAREST_HORIZON, quantile_graph
+from deepmuon_training.generators.quantile.graph import ENERGY_LATENTS, LATENT_SIZE, NEAREST_HORIZON, quantile_graph
 from deepmuon_training.generators.quantile.look_ups import LookUps, look_ups
 from deepmuon_training.generators.quantile.maps import QuantileGenerator
 
@@ -75,6 +75,7 @@ class QuantileTables:
 
     architecture = "quantile"
     latent_size = LATENT_SIZE
+    energy_latents = ENERGY_LATENTS
     muons_per_draw = 1
 
     def __call__(self, latent: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:

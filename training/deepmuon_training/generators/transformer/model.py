@@ -154,6 +154,7 @@ class TransformerModel:
     energy_range: tuple[float, float]
 
     architecture = "transformer"
+    energy_latents = None
 
     @classmethod
     def stored(cls, network: Transformer, **others: Any) -> TransformerModel:
