@@ -1,4 +1,4 @@
-"""`deepmuon-gen`: muons from a model to an HDF5 file."""
+"""`deepmuon-gen`: muons from a model to a file."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import click
 from click.core import ParameterSource
 
 from deepmuon_cli.options.completion import architectures, depths, devices
+from deepmuon_cli.options.formats import FORMAT
 from deepmuon_cli.options.mistyped import HelpfulCommand
 from deepmuon_cli.options.quantities import (
     degrees,
@@ -53,7 +54,9 @@ LEADS = {
     "--can": "write --cylinder RADIUS HEIGHT",
     **dict.fromkeys(("--material", "--medium", "--rock", "--density"), MEDIA),
     "--flux": "a model has its own, which is CRY's for the released ones",
-    **dict.fromkeys(("--format", "--csv", "--text", "--root"), "the file is HDF5, and deepmuon-csv writes text of it"),
+    **dict.fromkeys(
+        ("--csv", "--text", "--root", "--mcpl"), "the end of the file's name says its format: -o muons.mcpl"
+    ),
     **dict.fromkeys(("--gpu", "--cuda"), "write --device cuda"),
     **dict.fromkeys(("--time", "--exposure", "--duration"), "write --live-time SECONDS, with --area M2 or a target"),
     **dict.fromkeys(("-N", "--n", "--muons", "--events", "--count", "--size"), "write -n 1e6"),
@@ -74,7 +77,7 @@ VALUES = {
     "-n": r"[0-9.,_]+([eE][0-9]+)?",
     "--model": r".*\.onnx",
     "--architecture": r"quantile|transformer",
-    "-o": r".*\.(h5|hdf5|csv|root|txt)",
+    "-o": r".*\.(h5|hdf5|mcpl|csv|root|txt)(\.gz)?",
 }
 """What a word looks like whose option was forgotten."""
 
@@ -128,7 +131,8 @@ RECORDED = (
 @click.option(
     "--cylinder", type=size, nargs=2, metavar="R H", help="The same of an upright cylinder, radius and height."
 )
-@click.option("-o", "--output", type=FILE, metavar="FILE", help="The HDF5 file to be written.")
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="The file to be written.")
+@click.option("--format", "form", type=FORMAT, help="Of the file; what the end of its name says if left out, or HDF5.")
 @click.option("--overwrite", is_flag=True, help="Replace an existing file, once the new one is complete.")
 @click.option("--seed", type=seed_number, metavar="SEED", help="0 to 2^64 - 1; a new one if left out.")
 @click.option(
@@ -171,6 +175,7 @@ def gen(
     box: tuple[float, ...] | None,
     cylinder: tuple[float, ...] | None,
     output: Path | None,
+    form: str | None,
     overwrite: bool,
     seed: int | None,
     shard: Shard | None,
@@ -179,7 +184,7 @@ def gen(
     quiet: bool,
     list_only: bool,
 ) -> None:
-    """Write cosmic-ray muons to an HDF5 file.
+    """Write cosmic-ray muons to a file: HDF5 (.h5), or .mcpl, .mcpl.gz, .root, .csv or .csv.gz by the end of its name.
 
     The muons cross a horizontal plane downwards, at sea level (--depth 0) or under water, or enter a body: kinetic
     energy in GeV, direction of motion (u, v, w) with z up, and pdg_id, 13 for mu- and -13 for mu+. With a target they
@@ -240,13 +245,13 @@ def gen(
         raise click.UsageError("where to? Give the name of a file: -o muons.h5")
 
     from deepmuon_runtime import Cuts, Generator, new_seed
+    from deepmuon_runtime.formats.registry import output_format
     from deepmuon_runtime.latents.shard import WHOLE_RUN
-    from deepmuon_runtime.muon_file.output import check_muon_output
     from deepmuon_runtime.targets.by_name import target_of
 
     cuts = Cuts(energy_min, energy_max, zenith_min, zenith_max)
     target = next((target_of(name, numbers) for name, numbers in given.items()), None)
-    check_muon_output(output, overwrite, [] if model is None else [model])
+    output_format(output, form).check_output(output, overwrite, [] if model is None else [model])
     generator = Generator.open(depth, architecture, file=model, device=device, threads=threads)
     seed = new_seed() if seed is None else seed
     total = number
@@ -265,6 +270,7 @@ def gen(
             target=target,
             live_time=live_time,
             area=area,
+            format=form,
             overwrite=overwrite,
             progress=progress,
             attributes={"command_line": _command_line(context)},

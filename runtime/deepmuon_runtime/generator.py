@@ -17,14 +17,13 @@ import numpy as np
 
 from deepmuon_runtime.cuts import NO_CUTS, Cuts
 from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.formats.registry import output_format
 from deepmuon_runtime.latents.arrivals import Arrivals
 from deepmuon_runtime.latents.philox import checked_seed, new_seed
 from deepmuon_runtime.latents.shard import WHOLE_RUN, Shard
 from deepmuon_runtime.model.metadata import SPHERE
 from deepmuon_runtime.model.released import read_released, released_model
 from deepmuon_runtime.muon_file.format import COLUMNS, OPTIONAL_COLUMNS, PLACE, bytes_per_muon
-from deepmuon_runtime.muon_file.output import check_muon_output
-from deepmuon_runtime.muon_file.writer import MuonWriter
 from deepmuon_runtime.muons import Muons
 from deepmuon_runtime.ordered_map import ordered_map
 from deepmuon_runtime.room import check_disk, check_memory
@@ -218,11 +217,12 @@ class Generator:
         target: Target | None = None,
         live_time: float | None = None,
         area: float | None = None,
+        format: str | None = None,
         overwrite: bool = False,
         progress: Callable[[int], object] | None = None,
         attributes: Mapping[str, object] | None = None,
     ) -> None:
-        """Write the muons of `sample`, or a shard of them, to an HDF5 file, which appears only when it is complete.
+        """Write the muons of `sample`, or a shard of them, to a file, which appears only when it is complete.
 
         Parameters
         ----------
@@ -232,6 +232,9 @@ class Generator:
             As for `sample`; the file records them.
         shard
             Which part of the muons. The shards of one seed, made on any machines, together are all.
+        format
+            A name of `formats.registry.FORMATS`: "h5", "mcpl", "mcpl.gz", "root", "csv" or "csv.gz". What the end of
+            the file's name says if left out, and HDF5 if that says nothing.
         overwrite
             Whether an existing file may be replaced.
         progress
@@ -246,10 +249,11 @@ class Generator:
         FailedError
             If the model gives an unphysical muon, writing fails, or another process writes `path` meanwhile.
         """
+        form = output_format(path, format)
+        folder = form.check_output(path, overwrite).parent
         whole = self._run(n, seed, 0, cuts, target, live_time, area)
         run = whole._replace(numbers=shard.numbers(len(whole.numbers)))
-        folder = check_muon_output(path, overwrite).parent
-        check_disk(folder, len(run.numbers) * bytes_per_muon(run.columns), f"{len(run.numbers):,} muons")
+        check_disk(folder, len(run.numbers) * form.bytes_per_muon(run.columns), f"{len(run.numbers):,} muons")
         described = {
             **self._attributes(run, shard, len(whole.numbers)),
             **({} if live_time is None else {"live_time_s": live_time}),
@@ -258,7 +262,7 @@ class Generator:
         }
         optional = set(run.columns) - set(COLUMNS)
         chunks = self._chunks(run)
-        with MuonWriter(path, described, overwrite, optional=optional) as writer, closing(chunks):
+        with form.writer(path, described, overwrite, optional=optional) as writer, closing(chunks):
             for muons in chunks:
                 writer.append(muons)
                 if progress is not None:
