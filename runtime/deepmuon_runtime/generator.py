@@ -213,11 +213,11 @@ class Generator:
         seed: int | None = None,
         *,
         shard: Shard = WHOLE_RUN,
-        format: str | None = None,
         cuts: Cuts = NO_CUTS,
         target: Target | None = None,
         live_time: float | None = None,
         area: float | None = None,
+        format: str | None = None,
         overwrite: bool = False,
         progress: Callable[[int], object] | None = None,
         attributes: Mapping[str, object] | None = None,
@@ -249,10 +249,10 @@ class Generator:
         FailedError
             If the model gives an unphysical muon, writing fails, or another process writes `path` meanwhile.
         """
-        whole = self._run(n, seed, 0, cuts, target, live_time, area)
-        run = whole._replace(numbers=shard.numbers(len(whole.numbers)))
         form = output_format(path, format)
         folder = form.check_output(path, overwrite).parent
+        whole = self._run(n, seed, 0, cuts, target, live_time, area)
+        run = whole._replace(numbers=shard.numbers(len(whole.numbers)))
         check_disk(folder, len(run.numbers) * form.bytes_per_muon(run.columns), f"{len(run.numbers):,} muons")
         described = {
             **self._attributes(run, shard, len(whole.numbers)),

@@ -503,7 +503,7 @@ def test_an_option_that_is_misspelt_is_told_with_the_nearest_one(gen):
         ("--out muons.h5", "did you mean --output?"),
         ("--Depth 10", "did you mean --depth?"),
         ("--depht 10", "did you mean --depth?"),
-        ("--energy-min 1", "keep those you want when you read the file"),
+        ("--charge 1", "keep those you want when you read the file"),
         ("--material G4_ROCK", "deepmuon-train transport takes their muons through other materials"),
         ("--flux cry", "a model has its own"),
         ("--csv", "the end of the file's name says its format: -o muons.mcpl"),

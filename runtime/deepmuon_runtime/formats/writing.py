@@ -80,8 +80,8 @@ class Writer(ABC):
         return self
 
     def append(self, muons: Muons) -> None:
-        """Write muons, to a file without optional columns, after those already written."""
-        self.append_columns(vars(muons))
+        """Write muons, with the columns of the file, after those already written."""
+        self.append_columns(muons.columns)
 
     def append_columns(self, columns: Mapping[str, ArrayLike]) -> None:
         """Write muons, as all columns of the file by their names, after those already written."""

@@ -16,8 +16,8 @@ from deepmuon_runtime.latents.philox import LARGEST_SEED
 from deepmuon_runtime.latents.shard import Shard
 from deepmuon_runtime.model.metadata import Model, are_one_rate, is_name
 from deepmuon_runtime.muon_file.checksum import attributes_crc32, unlike
-from deepmuon_runtime.muon_file.choice import choice_defects
 from deepmuon_runtime.muon_file.format import ATTRIBUTES_CHECKSUM, python_value
+from deepmuon_runtime.muon_file.place_and_time import choice_defects
 
 __all__ = [
     "ALWAYS",

@@ -18,7 +18,6 @@ from deepmuon_runtime.model.metadata import Model
 from deepmuon_runtime.model.released import list_models, read_released
 from deepmuon_runtime.muon_file.attributes import attribute_defects, checksum_defects, is_generated, sound_attributes
 from deepmuon_runtime.muon_file.checksum import crc32, unlike
-from deepmuon_runtime.muon_file.choice import cuts_of, target_of_file
 from deepmuon_runtime.muon_file.columns import (
     columns_of,
     missing_columns,
@@ -28,7 +27,7 @@ from deepmuon_runtime.muon_file.columns import (
 )
 from deepmuon_runtime.muon_file.damage import READ_ERRORS, member
 from deepmuon_runtime.muon_file.format import CHECKSUM, COLUMNS, check_format, stated
-from deepmuon_runtime.muon_file.place_and_time import PlacesAndTimes
+from deepmuon_runtime.muon_file.place_and_time import PlacesAndTimes, cuts_of, target_of_file
 from deepmuon_runtime.muon_file.reader import opened_file
 from deepmuon_runtime.muon_file.virtual import VirtualColumn, opened_source
 from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
