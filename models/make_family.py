@@ -190,17 +190,17 @@ def release(work: Path) -> None:
     notes = (work / "notes.txt").read_text(encoding="utf-8").splitlines()
     text = family_card(released, knots, evaluations, command=COMMAND, notes=notes)
     released.with_suffix(".md").write_text(text, encoding="utf-8")
-    for knot in knots:
-        if knot.depth_m in BAKED:
-            _release_baked(released, knot, evaluations[knot.depth_m], notes)
+    for metres, knot in zip(KNOTS, knots, strict=True):
+        if metres in BAKED:
+            _release_baked(released, metres, knot, evaluations[metres], notes)
     write_manifest()
 
 
-def _release_baked(family: Path, knot: Training, evaluation: Evaluation, notes: list[str]) -> None:
+def _release_baked(family: Path, metres: float, knot: Training, evaluation: Evaluation, notes: list[str]) -> None:
     """Bake the model of a knot, and put it where it is released, with its test vectors, scores, pictures and card."""
-    name, depth = f"quantile-{knot.depth_m:g}m", f"{knot.depth_m:g} m"
+    name, depth = f"quantile-{metres:g}m", f"{metres:g} m"
     path = RELEASED / f"{name}.onnx"
-    path.write_bytes(bake(family.read_bytes(), knot.depth_m, name=family.name))
+    path.write_bytes(bake(family.read_bytes(), metres, name=family.name))
     (VECTORS / f"{name}.json").write_text(muon_vectors(path), encoding="utf-8")
     (EVALUATIONS / f"{name}.json").write_text(evaluation.to_json(), encoding="utf-8")
     (EVALUATIONS / name).mkdir(exist_ok=True)
