@@ -132,17 +132,19 @@ def release(work: Path, family: Family) -> None:
     notes = (work / "notes.txt").read_text(encoding="utf-8").splitlines()
     text = family_card(released, knots, evaluations, command=family.command, notes=notes)
     released.with_suffix(".md").write_text(text, encoding="utf-8")
-    for knot in knots:
-        if knot.depth_m in family.baked:
-            _release_baked(released, family, knot, evaluations[knot.depth_m, 0], notes)
+    for depth_m, knot in zip(family.knots, knots, strict=True):
+        if depth_m in family.baked:
+            _release_baked(released, family, depth_m, knot, evaluations[depth_m, 0], notes)
     write_manifest()
 
 
-def _release_baked(released: Path, family: Family, knot: Training, evaluation: Evaluation, notes: list[str]) -> None:
+def _release_baked(
+    released: Path, family: Family, depth_m: float, knot: Training, evaluation: Evaluation, notes: list[str]
+) -> None:
     """Bake the model of a knot, and put it where it is released, with its test vectors, scores, pictures and card."""
-    name, depth = f"quantile-{knot.depth_m:g}m", f"{knot.depth_m:g} m"
+    name, depth = f"quantile-{depth_m:g}m", f"{depth_m:g} m"
     path = RELEASED / f"{name}.onnx"
-    path.write_bytes(bake(released.read_bytes(), knot.depth_m, name=released.name))
+    path.write_bytes(bake(released.read_bytes(), depth_m, name=released.name))
     (VECTORS / f"{name}.json").write_text(muon_vectors(path), encoding="utf-8")
     (EVALUATIONS / f"{name}.json").write_text(evaluation.to_json(), encoding="utf-8")
     (EVALUATIONS / name).mkdir(exist_ok=True)
