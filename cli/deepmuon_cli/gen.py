@@ -1,4 +1,4 @@
-"""`deepmuon-gen`: muons from a model to an HDF5 file."""
+"""`deepmuon-gen`: muons from a model to a file."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import click
 from click.core import ParameterSource
 
 from deepmuon_cli.options.completion import architectures, depths, devices
+from deepmuon_cli.options.formats import FORMAT
 from deepmuon_cli.options.mistyped import HelpfulCommand
 from deepmuon_cli.options.quantities import (
     metres,
@@ -43,7 +44,9 @@ LEADS = {
     **dict.fromkeys(("--zenith-min", "--zenith-max", "--charge", "--energy", "--zenith"), CUTS),
     **dict.fromkeys(("--material", "--medium", "--rock", "--density"), MEDIA),
     "--flux": "a model has its own, which is CRY's for the released ones",
-    **dict.fromkeys(("--format", "--csv", "--text", "--root"), "the file is HDF5, and deepmuon-csv writes text of it"),
+    **dict.fromkeys(
+        ("--csv", "--text", "--root", "--mcpl"), "the end of the file's name says its format: -o muons.mcpl"
+    ),
     **dict.fromkeys(("--gpu", "--cuda"), "write --device cuda"),
     **dict.fromkeys(("--time", "--exposure", "--duration"), "write --live-time SECONDS --area M2"),
     **dict.fromkeys(("-N", "--n", "--muons", "--events", "--count", "--size"), "write -n 1e6"),
@@ -64,7 +67,7 @@ VALUES = {
     "-n": r"[0-9.,_]+([eE][0-9]+)?",
     "--model": r".*\.onnx",
     "--architecture": r"quantile|transformer",
-    "-o": r".*\.(h5|hdf5|csv|root|txt)",
+    "-o": r".*\.(h5|hdf5|mcpl|csv|root|txt)(\.gz)?",
 }
 """What a word looks like whose option was forgotten."""
 
@@ -101,7 +104,8 @@ RECORDED = ("depth", "architecture", "number", "live_time", "area", "seed", "sha
     help="Instead of -n: the muons that cross --area in this time, a Poisson number at the model's rate.",
 )
 @click.option("--area", type=square_metres, metavar="M2", help="The horizontal area for --live-time.")
-@click.option("-o", "--output", type=FILE, metavar="FILE", help="The HDF5 file to be written.")
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="The file to be written.")
+@click.option("--format", "form", type=FORMAT, help="Of the file; what the end of its name says if left out, or HDF5.")
 @click.option("--overwrite", is_flag=True, help="Replace an existing file, once the new one is complete.")
 @click.option("--seed", type=seed_number, metavar="SEED", help="0 to 2^64 - 1; a new one if left out.")
 @click.option(
@@ -136,6 +140,7 @@ def gen(
     live_time: float | None,
     area: float | None,
     output: Path | None,
+    form: str | None,
     overwrite: bool,
     seed: int | None,
     shard: Shard | None,
@@ -144,7 +149,7 @@ def gen(
     quiet: bool,
     list_only: bool,
 ) -> None:
-    """Write cosmic-ray muons to an HDF5 file.
+    """Write cosmic-ray muons to a file: HDF5 (.h5), or .mcpl, .mcpl.gz, .root, .csv or .csv.gz by the end of its name.
 
     The muons cross a horizontal plane downwards, at sea level (--depth 0) or under water: kinetic energy in
     GeV, direction of motion (u, v, w) with z up, and pdg_id, 13 for mu- and -13 for mu+.
@@ -190,10 +195,10 @@ def gen(
         raise click.UsageError("where to? Give the name of a file: -o muons.h5")
 
     from deepmuon_runtime import Generator, new_seed
+    from deepmuon_runtime.formats.registry import output_format
     from deepmuon_runtime.latents.shard import WHOLE_RUN
-    from deepmuon_runtime.muon_file.output import check_muon_output
 
-    check_muon_output(output, overwrite, [] if model is None else [model])
+    output_format(output, form).check_output(output, overwrite, [] if model is None else [model])
     generator = Generator.open(depth, architecture, file=model, device=device, threads=threads)
     seed = new_seed() if seed is None else seed
     attributes: dict[str, object] = {"command_line": _command_line(context)}
@@ -205,7 +210,14 @@ def gen(
     count = len(shard.numbers(number))
     with _progress(count, hidden=quiet) as progress:
         generator.write(
-            output, number, seed, shard=shard, overwrite=overwrite, progress=progress, attributes=attributes
+            output,
+            number,
+            seed,
+            shard=shard,
+            format=form,
+            overwrite=overwrite,
+            progress=progress,
+            attributes=attributes,
         )
     if not quiet:
         click.echo(_closing_line(output, count, time.perf_counter() - started, generator, seed))

@@ -3,12 +3,14 @@
 import os
 
 from deepmuon_runtime.errors import DeepMuonError, FailedError, RefusedError
+from deepmuon_runtime.formats.check import check_file
+from deepmuon_runtime.formats.convert import convert_file
 from deepmuon_runtime.generator import Generator
 from deepmuon_runtime.latents.philox import new_seed
 from deepmuon_runtime.latents.shard import Shard
 from deepmuon_runtime.model.metadata import Model
 from deepmuon_runtime.model.released import list_models
-from deepmuon_runtime.muon_file.check import Report, check_file
+from deepmuon_runtime.muon_file.check import Report
 from deepmuon_runtime.muon_file.merge import merge_shards
 from deepmuon_runtime.muon_file.reader import read_attributes, read_muons
 from deepmuon_runtime.muon_file.writer import MuonWriter, write_muons
@@ -25,6 +27,7 @@ __all__ = [
     "Report",
     "Shard",
     "check_file",
+    "convert_file",
     "list_models",
     "merge_shards",
     "new_seed",

@@ -16,14 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import FailedError, RefusedError, first_line
+from deepmuon_runtime.formats.registry import output_format
 from deepmuon_runtime.latents.philox import checked_seed, fill_latents, new_seed
 from deepmuon_runtime.latents.poisson import poisson
 from deepmuon_runtime.latents.shard import WHOLE_RUN, Shard
 from deepmuon_runtime.model.metadata import LATENTS_PER_MUON, SPHERE, Model
 from deepmuon_runtime.model.released import read_released, released_model
-from deepmuon_runtime.muon_file.format import BYTES_PER_MUON
-from deepmuon_runtime.muon_file.output import check_muon_output
-from deepmuon_runtime.muon_file.writer import MuonWriter
+from deepmuon_runtime.muon_file.format import BYTES_PER_MUON, COLUMNS
 from deepmuon_runtime.muons import MU_PLUS, Muons
 from deepmuon_runtime.ordered_map import ordered_map
 from deepmuon_runtime.physical import check_physical
@@ -207,11 +206,12 @@ class Generator:
         seed: int | None = None,
         *,
         shard: Shard = WHOLE_RUN,
+        format: str | None = None,
         overwrite: bool = False,
         progress: Callable[[int], object] | None = None,
         attributes: Mapping[str, object] | None = None,
     ) -> None:
-        """Write n muons, or a shard of them, to an HDF5 file, which appears under its name only when it is complete.
+        """Write n muons, or a shard of them, to a file, which appears under its name only when it is complete.
 
         Parameters
         ----------
@@ -221,6 +221,9 @@ class Generator:
             As for `sample`; the file records the seed.
         shard
             Which part of the n muons. The shards of one seed, made on any machines, together are the n muons.
+        format
+            A name of `formats.registry.FORMATS`: "h5", "mcpl", "mcpl.gz", "root", "csv" or "csv.gz". What the end of
+            the file's name says if left out, and HDF5 if that says nothing.
         overwrite
             Whether an existing file may be replaced.
         progress
@@ -237,11 +240,12 @@ class Generator:
         """
         total, seed = len(checked_numbers(n)), _seed(seed)
         numbers = shard.numbers(total)
-        folder = check_muon_output(path, overwrite).parent
-        check_disk(folder, len(numbers) * BYTES_PER_MUON, f"{len(numbers):,} muons")
+        form = output_format(path, format)
+        folder = form.check_output(path, overwrite).parent
+        check_disk(folder, len(numbers) * form.bytes_per_muon(COLUMNS), f"{len(numbers):,} muons")
         described = {**self._attributes(seed, shard, total), **(attributes or {})}
         chunks = self.chunks(len(numbers), seed, first=numbers.start)
-        with MuonWriter(path, described, overwrite) as writer, closing(chunks):
+        with form.writer(path, described, overwrite) as writer, closing(chunks):
             for muons in chunks:
                 writer.append(muons)
                 if progress is not None:

@@ -89,15 +89,14 @@ def test_no_name_of_a_file_is_recorded(gen, model_file):
         ),
         ("/dev/stdout", "/dev/stdout is a device or a pipe: give the name of a regular file"),
         (
-            "muons.csv",
-            "muons.csv would be HDF5 under a name of text: write muons.h5, and then deepmuon-csv muons.h5",
+            "muons.txt",
+            "muons.txt would be HDF5 under a name of text: write muons.h5, and then",
         ),
-        ("muons.root", "muons.root would be HDF5 under a name of ROOT: write muons.h5, and then read it in Python"),
         ("muons.parquet", "muons.parquet would be HDF5 under a name of Parquet"),
-        ("muons.mcpl", "muons.mcpl would be HDF5 under a name of MCPL"),
+        ("muons.h5.gz", "muons.h5.gz would be HDF5 under a name of a packed file"),
     ],
 )
-def test_an_output_that_promises_what_is_not_hdf5_is_refused(tmp_path, model_file, output, reason):
+def test_an_output_that_promises_what_is_not_written_is_refused(tmp_path, model_file, output, reason):
     """With stdout a pipe."""
     words = [*COMMAND, "--model", str(model_file), "-n", "10", "-o", output]
     before = set(tmp_path.iterdir())
@@ -498,7 +497,8 @@ def test_an_option_that_is_misspelt_is_told_with_the_nearest_one(gen):
         ("--energy-min 1", "keep those you want when you read the file"),
         ("--material G4_ROCK", "deepmuon-train transport takes their muons through other materials"),
         ("--flux cry", "a model has its own"),
-        ("--format csv", "deepmuon-csv writes text"),
+        ("--csv", "the end of the name says the format: -o muons.mcpl"),
+        ("--format text -o muons.h5", "'text' is not one of 'h5', 'mcpl', 'mcpl.gz', 'root', 'csv', 'csv.gz'"),
         ("--gpu", "write --device cuda"),
         ("--xyzzy", "deepmuon-gen --help lists"),
     ],

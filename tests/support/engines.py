@@ -191,15 +191,7 @@ def run_in_opencv(model: Path) -> Muons:
 def run_in_tract(model: Path) -> Muons:
     import tract
 
-    # Its analysis of a transformer's shapes depends on an order that changes from run to run, and fails once in fifty
-    # ("Impossible to unify"); what it analyses it runs right. Who embeds tract has to load again, too.
-    for attempt in range(5):
-        try:
-            runnable = tract.onnx().load(model).into_model().into_runnable()
-            break
-        except tract.TractError as error:
-            if attempt == 4 or "Impossible to unify" not in str(error):
-                raise
+    runnable = tract.onnx().load(model).into_model().into_runnable()
     found = runnable.run([latents(model)])
     return Muons(*(tensor.to_numpy() for tensor in found[: len(OUTPUTS)]))
 

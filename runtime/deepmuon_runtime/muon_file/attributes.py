@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Callable, Iterator, Mapping
-from datetime import datetime, timedelta
+from datetime import datetime, timedelta, timezone
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from deepmuon_runtime.errors import RefusedError
@@ -13,9 +16,18 @@ from deepmuon_runtime.latents.philox import LARGEST_SEED
 from deepmuon_runtime.latents.shard import Shard
 from deepmuon_runtime.model.metadata import Model, are_one_rate, is_name
 from deepmuon_runtime.muon_file.checksum import attributes_crc32, unlike
-from deepmuon_runtime.muon_file.format import ATTRIBUTES_CHECKSUM
+from deepmuon_runtime.muon_file.format import ATTRIBUTES_CHECKSUM, python_value
 
-__all__ = ["ALWAYS", "attribute_defects", "checksum_defects", "is_generated", "sound_attributes", "value_defects"]
+__all__ = [
+    "ALWAYS",
+    "LIVE_TIMES",
+    "Description",
+    "attribute_defects",
+    "checksum_defects",
+    "is_generated",
+    "sound_attributes",
+    "value_defects",
+]
 
 ROUNDING = 1e-9  # relative, of a live time
 
@@ -221,3 +233,82 @@ def _model_defects(sound: Mapping[str, Any], model: Model) -> Iterator[str]:
 def _shown(value: object) -> str:
     text = ascii(value)
     return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+SOURCE_DATE_EPOCH = "SOURCE_DATE_EPOCH"
+"""Environment variable that states the time of `created`, so that a repeated run gives the same bytes
+(https://reproducible-builds.org/specs/source-date-epoch/)."""
+
+
+class Description:
+    """What a file that is being written says of its muons.
+
+    Parameters
+    ----------
+    path
+        The file, for errors.
+    attributes
+        What was given: see `deepmuon_runtime.muon_file.writer.MuonWriter`.
+
+    Raises
+    ------
+    RefusedError
+        If an attribute is missing or can't be what it is, or SOURCE_DATE_EPOCH is no time.
+    """
+
+    def __init__(self, path: str | Path, attributes: Mapping[str, object]) -> None:
+        missing = [name for name in ("depth_m", "medium") if name not in attributes]
+        if missing:
+            raise RefusedError(f"a muon file must say its {' and '.join(missing)}: add it to the attributes")
+        self._created = _stated_time()
+        self._attributes = {name: _storable(value) for name, value in attributes.items()}
+        for defect in _defects(self._attributes):
+            raise RefusedError(f"{path} was not written: {defect}")
+
+    def of(self, count: int) -> dict[str, Any]:
+        """Return all attributes of a file of so many muons that is complete now."""
+        attributes = {"created_by": f"deepmuon-runtime {version('deepmuon-runtime')}", **self._attributes}
+        attributes["count"] = count
+        attributes["created"] = (self._created or datetime.now(timezone.utc)).isoformat(timespec="seconds")
+        for live_time, rate in LIVE_TIMES.items():
+            if attributes.get(rate, 0) > 0:
+                attributes[live_time] = count / float(attributes[rate])
+        return attributes
+
+
+def _stated_time() -> datetime | None:
+    """Return the time that the environment states for all that is made, if it does.
+
+    Raises
+    ------
+    RefusedError
+        If it is none.
+    """
+    stated = os.environ.get(SOURCE_DATE_EPOCH)
+    if stated is None:
+        return None
+    try:
+        return datetime.fromtimestamp(int(stated), timezone.utc)
+    except (ValueError, OverflowError, OSError) as error:
+        raise RefusedError(
+            f"{SOURCE_DATE_EPOCH} is {stated!r}, and should be whole seconds since 1970 (unset it for the present time)"
+        ) from error
+
+
+def _storable(value: Any) -> Any:
+    """Return an attribute with what HDF5 can't hold in a text escaped: the byte 0, and what is no UTF-8."""
+    if isinstance(value, (list, tuple)):
+        return [_storable(item) for item in value]
+    if isinstance(value, str):
+        return value.replace("\0", r"\x00").encode("utf-8", "backslashreplace").decode()
+    return value
+
+
+def _defects(attributes: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what keeps attributes from being written: no reader would take them."""
+    attributes = {name: python_value(value) for name, value in attributes.items()}
+    try:
+        attributes_crc32(attributes)
+    except ValueError as error:
+        yield str(error)
+    yield from value_defects(attributes)

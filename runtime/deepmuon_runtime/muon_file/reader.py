@@ -10,14 +10,13 @@ from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
 from typing import Any
-from zlib import crc32
 
 import h5py
 from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import RefusedError, reason
 from deepmuon_runtime.muon_file.attributes import ALWAYS, checksum_defects, value_defects
-from deepmuon_runtime.muon_file.checksum import unlike
+from deepmuon_runtime.muon_file.checksum import crc32, unlike
 from deepmuon_runtime.muon_file.columns import (
     columns_of,
     missing_columns,

@@ -130,7 +130,10 @@ def test_quiet_says_nothing(carry):
         (["-o", "link.h5", "--overwrite"], "link.h5 is read here, and would be replaced"),
         (["-o", "other.h5"], "exists already"),
         (["-o", "no_folder/below.h5"], "no folder"),
-        (["-o", "below.csv"], "below.csv would be HDF5 under a name of text: write below.h5, and then deepmuon-csv"),
+        (
+            ["-o", "below.csv"],
+            "below.csv would be HDF5 under a name of text: write below.h5, and then",
+        ),
         (["-o", "-"], "- is no name of a muon file"),
     ],
 )
