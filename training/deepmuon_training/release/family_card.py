@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence, Set
 from pathlib import Path
 
+import numpy as np
+
 from deepmuon_training.export.metadata import Training
 from deepmuon_training.release.card import GENERAL_LIMITS, manifest_entry
 from deepmuon_training.scores.evaluation import Evaluation
@@ -44,7 +46,7 @@ def family_card(
     """
     said = manifest_entry(model)
     range_ = f"{said['depth_min_m']} to {said['depth_max_m']} m"
-    depths = {knot.depth_m for knot in knots}
+    depths = {np.float32(knot.depth_m) for knot in knots}  # 0.1 and 0.2 m of water make no 0.3 in double precision
     return "\n".join(
         [
             f"# {said['architecture']}, {range_} of {said['medium']}",
@@ -101,10 +103,10 @@ def _rate(knot: Training) -> str:
     return f"{knot.rate:.6g}" + ("" if knot.rate_uncertainty is None else f" ± {knot.rate_uncertainty:.2g}")
 
 
-def _rows(evaluations: Mapping[tuple[float, int], Evaluation], surface: int, knots: Set[float]) -> Iterator[str]:
+def _rows(evaluations: Mapping[tuple[float, int], Evaluation], surface: int, knots: Set[np.float32]) -> Iterator[str]:
     for depth, of in sorted(evaluations):
         if of == surface:
-            yield _row(depth, depth in knots, evaluations[depth, of])
+            yield _row(depth, np.float32(depth) in knots, evaluations[depth, of])
 
 
 def _row(depth: float, at_knot: bool, found: Evaluation) -> str:
