@@ -23,7 +23,7 @@ def test_the_tree_has_a_branch_for_each_column_and_a_text_says_what_is_known(tmp
         assert file.classnames(cycle=False) == {"muons": "TTree", "deepmuon": "TObjString"}
         tree = file["muons"]
         assert tree.typenames() == {**dict.fromkeys(["kinetic_energy", "u", "v", "w"], "float"), "pdg_id": "int32_t"}
-        for name, values in vars(muons).items():
+        for name, values in muons.columns.items():
             np.testing.assert_array_equal(tree[name].array(library="np"), values)
         said = json.loads(str(file["deepmuon"]))
     assert (said["seed"], said["count"], said["depth_m"], said["rate_hz_per_m2"]) == (1, 1000, 10.0, 55.5)

@@ -113,7 +113,7 @@ def contents(run: Path) -> dict[str, object]:
             attributes = read_attributes(path)
             attributes = {name: attributes[name] for name in attributes.keys() - {"created", "command_line"}}
             muons = read_muons(path)
-            found[path.name] = attributes, {name: getattr(muons, name).tobytes() for name in vars(muons)}
+            found[path.name] = attributes, {name: getattr(muons, name).tobytes() for name in muons.columns}
         else:
             found[path.name] = path.read_bytes()
     return found
