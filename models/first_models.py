@@ -2,7 +2,7 @@
 
     python models/first_models.py FOLDER
 
-The folder holds the ONNX files of release 0.1.0. A `transformer` keeps all its numbers, and its nodes get names. Of a
+The folder holds the ONNX files of release 0.1.0. A `transformer` keeps all its numbers. Of a
 `quantile` model the tables lay elsewhere, evenly in the logarithm of the tail probability, with a sign: the maps are
 evaluated, by the interpolation that 0.1.0 used, at the knots of this release.
 """
@@ -105,8 +105,8 @@ def release(old: Path) -> None:
     (VECTORS / f"{new.stem}.json").write_text(muon_vectors(new), encoding="utf-8")
     described = manifest_entry(new)
     card = new.with_suffix(".md").read_text()
-    for key in ("sha256", "size", "created_by"):
-        card = re.sub(rf"^\| {key} \| .* \|$", f"| {key} | {described[key]} |", card, flags=re.MULTILINE)
+    table = "".join(f"| {key} | {value} |\n" for key, value in described.items())
+    card = re.sub(r"(?<=\|---\|---\|\n)(\| .* \|\n)+", table, card, count=1)
     card = re.sub(
         r"^- (The tables differ|ONNX Runtime differs|The numbers of release).*\n", "", card, flags=re.MULTILINE
     )

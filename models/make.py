@@ -1,9 +1,11 @@
-"""Makes the released models again, from CRY's muons to ONNX files, cards and manifest.
+"""Makes released models of one depth again, from CRY's muons to ONNX files, cards and manifest.
 
     python models/make.py --cry cry_sea_level.h5 --more-cry cry_40M.h5 --work work
 
 From 30 m on the muons come from a second, larger run of CRY, of which few muons in a hundred get there.
-Steps whose result lies in the work folder are not repeated, and an interrupted fit goes on from its checkpoint.
+`quantile` ones are baked of the family that models/make_family.py makes; named by --architecture they are fitted at
+their depth alone. Steps whose result lies in the work folder are not repeated, and an interrupted fit goes on from its
+checkpoint.
 On two cores: 40 minutes to carry the muons through water, 4 for each `quantile` and 25 for each `transformer` model,
 and 2 to evaluate one.
 """
@@ -58,7 +60,14 @@ Make = Callable[[Path, bool], None]
 @click.option("--more-cry", type=click.Path(exists=True, path_type=Path), help="More of them, for 30 m and deeper.")
 @click.option("--work", required=True, type=click.Path(path_type=Path), help="Folder for samples and checkpoints.")
 @click.option("--depth", "depths", multiple=True, type=int, default=DEPTHS, show_default=True)
-@click.option("--architecture", "architectures", multiple=True, default=tuple(ARCHITECTURES), show_default=True)
+@click.option(
+    "--architecture",
+    "architectures",
+    multiple=True,
+    type=click.Choice(tuple(ARCHITECTURES)),
+    default=("transformer",),
+    show_default=True,
+)
 def main(cry: Path, more_cry: Path | None, work: Path, depths: tuple[int, ...], architectures: tuple[str, ...]) -> None:
     """Make each model of each depth, then the manifest."""
     if more_cry is None and max(depths) >= DEEP:

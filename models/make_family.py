@@ -10,39 +10,31 @@ nor what they alone would need, and an interrupted step goes on. Most of the tim
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
 from pathlib import Path
 
 import click
 
-from deepmuon_runtime.model.baking import bake
 from deepmuon_training.data.cry import HELD_OUT_CRY_MUONS, read_cry
 from deepmuon_training.data.smoothing import StepSmoother
-from deepmuon_training.generators.family import family_of
-from deepmuon_training.generators.fit import fit_generator
-from deepmuon_training.generators.fitted import FittedGenerator
 from deepmuon_training.pipeline.step import Step, run_steps
-from deepmuon_training.release.family_card import family_card
-from deepmuon_training.release.vectors import muon_vectors
 from deepmuon_training.sample import Sample, read_sample, write_sample
-from deepmuon_training.scores.evaluation import Evaluation
-from deepmuon_training.scores.model_evaluation import evaluate_model
 from deepmuon_training.transport.slab_file import transport_file
 from family_plan import CUT, KNOTS, PLAN, TESTED, Slab, Surface, sample_name
-from make import EVALUATED_MUONS, EVALUATIONS, RELEASED, SEED, VECTORS, write_manifest
+from released_family import Family, Make, family_steps, make_folders, release, sample_file
 
-NAME = "quantile-water"
-
-BAKED = (0, 10, 20, 30, 40, 50)
-"""Depths [m] that are released as files of their own, too."""
+CRY = Family(
+    name="quantile-water",
+    flux="cry",
+    knots=KNOTS,
+    tested=TESTED,
+    command="python models/make_family.py --cry cry_sea_level.h5 --surfaces FOLDER --work work",
+    baked=(0, 10, 20, 30, 40, 50),
+)
 
 AS_IT_IS = 10**3.4
 """From this energy [GeV] on muons are as CRY has them: the maps knew five such muons, and go on as a power law.
 In a larger set that would pass the energy where Geant4's tables end."""
-
-Make = Callable[[Path, bool], None]
 
 
 @click.command(help=__doc__)
@@ -58,16 +50,9 @@ def main(cry: Path | None, surfaces: Path | None, work: Path, only_plan: bool) -
                 kept = f", E |w| of {CUT * step.cut_m:g} GeV and more" if step.cut_m else ""
                 click.echo(f"{step.name}.h5: {step.muons:,} muons of CRY, seeds from {step.seed} on{kept}")
         return
-    for folder in (work / "samples", work / "generators", work / "evaluations"):
-        folder.mkdir(parents=True, exist_ok=True)
-    steps = [*sample_steps(cry, surfaces, work), *family_steps(work)]
-    run_steps(steps, click.echo)
-    release(work)
-
-
-def sample_file(work: Path, name: str) -> Path:
-    """Where a sample, or a set at sea level, lies."""
-    return work / "samples" / f"{name}.h5"
+    make_folders(work)
+    run_steps([*sample_steps(cry, surfaces, work), *family_steps(work, CRY)], click.echo)
+    release(work, CRY)
 
 
 def sample_steps(cry: Path | None, surfaces: Path | None, work: Path) -> Iterator[Step]:
@@ -131,66 +116,6 @@ def _carry(work: Path, slab: Slab) -> Make:
         )
 
     return make
-
-
-def family_steps(work: Path) -> Iterator[Step]:
-    """Yield the steps that fit the knots, make the family, and score it at each depth."""
-    generators = [work / "generators" / f"{depth:g}m.pt" for depth in KNOTS]
-    for depth, generator in zip(KNOTS, generators, strict=True):
-        yield Step("fit", f"at {depth:g} m", generator, _fit(work, depth, generator))
-    model = work / f"{NAME}.onnx"
-    yield Step("family", f"{len(KNOTS)} generators", work / "notes.txt", _family(generators, model))
-    for depth in TESTED:
-        evaluation = work / "evaluations" / f"{depth:g}m.json"
-        yield Step("score", f"at {depth:g} m", evaluation, _score(work, model, depth, evaluation))
-
-
-def _fit(work: Path, depth: float, generator: Path) -> Make:
-    def make(saved: Path, progress: bool) -> None:
-        sample = replace(read_sample(sample_file(work, sample_name("training", depth))), flux="cry")
-        fit_generator(sample, "quantile", seed=SEED, checkpoint_folder=saved, progress=progress).save(generator)
-
-    return make
-
-
-def _family(generators: list[Path], model: Path) -> Make:
-    def make(_: Path, progress: bool) -> None:
-        family = family_of([FittedGenerator.load(path) for path in generators])
-        mismatch = family.export(model, overwrite=True)
-        (model.parent / "notes.txt").write_text("\n".join((*family.notes, mismatch.note)) + "\n", encoding="utf-8")
-
-    return make
-
-
-def _score(work: Path, model: Path, depth: float, evaluation: Path) -> Make:
-    def make(_: Path, progress: bool) -> None:
-        held_out = read_sample(sample_file(work, sample_name("testing", depth)))
-        found = evaluate_model(model, held_out, EVALUATED_MUONS, seed=SEED, depth=depth)
-        evaluation.write_text(found.to_json(), encoding="utf-8")
-
-    return make
-
-
-def release(work: Path) -> None:
-    """Put the family, its scores and its card where they are released, and the files of single depths baked from it."""
-    model, released = work / f"{NAME}.onnx", RELEASED / f"{NAME}.onnx"
-    shutil.copyfile(model, released)
-    evaluations = {}
-    (EVALUATIONS / NAME).mkdir(exist_ok=True)
-    for depth in TESTED:
-        text = (work / "evaluations" / f"{depth:g}m.json").read_text(encoding="utf-8")
-        (EVALUATIONS / NAME / f"{depth:g}m.json").write_text(text, encoding="utf-8")
-        evaluations[float(depth)] = Evaluation.from_json(text)
-    knots = [FittedGenerator.load(work / "generators" / f"{depth:g}m.pt").training for depth in KNOTS]
-    command = "python models/make_family.py --cry cry_sea_level.h5 --surfaces FOLDER --work work"
-    notes = (work / "notes.txt").read_text(encoding="utf-8").splitlines()
-    card = family_card(released, knots, evaluations, command=command, notes=notes)
-    released.with_suffix(".md").write_text(card, encoding="utf-8")
-    for depth in BAKED:
-        fixed = RELEASED / f"quantile-{depth}m.onnx"
-        fixed.write_bytes(bake(released.read_bytes(), depth))
-        (VECTORS / f"{fixed.stem}.json").write_text(muon_vectors(fixed), encoding="utf-8")
-    write_manifest()
 
 
 if __name__ == "__main__":

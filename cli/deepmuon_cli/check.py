@@ -29,13 +29,15 @@ def check(context: click.Context, file: Path) -> None:
     \b
         deepmuon-check muons.h5
 
+    MCPL, ROOT and text that DeepMuon wrote are checked likewise, as far as they keep what a muon file does.
+
     Prints a summary, and a line for each kind of defect with the first muon that has it, counted from 0 in the
     file. A model's muons must lie in its range of energy if it is a released one; of other muons the energy
     must be above 0. What a file says of itself can be false without being a defect: nothing here proves who wrote it.
 
-    Exit codes: 0 no defect, 3 a defect, 2 can't be read as a muon file.
+    Exit codes: 0 no defect, 3 a defect, 2 can't be read as a file of muons.
     """  # noqa: D301 - click looks for the character \b
-    from deepmuon_runtime.muon_file.check import check_file
+    from deepmuon_runtime.formats.check import check_file
 
     report = check_file(file, progress=lambda _: show_life())
     click.echo(f"{file}: {report.examined:,} muons examined")

@@ -1,11 +1,11 @@
-"""`deepmuon-gen`: muons from a model to an HDF5 file."""
+"""`deepmuon-gen`: muons from a model to a file."""
 
 from __future__ import annotations
 
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
@@ -15,20 +15,24 @@ import click
 from click.core import ParameterSource
 
 from deepmuon_cli.options.completion import architectures, depths, devices
+from deepmuon_cli.options.formats import FORMAT
 from deepmuon_cli.options.mistyped import HelpfulCommand
 from deepmuon_cli.options.quantities import (
+    degrees,
+    gev,
     metres,
     muon_number,
     seconds,
     seed_number,
     shard_number,
+    size,
     square_metres,
     thread_number,
 )
 from deepmuon_cli.process.ending import run
 
 if TYPE_CHECKING:  # the libraries are imported when they are needed: --help is answered at once
-    from deepmuon_runtime import Generator, Shard
+    from deepmuon_runtime import Rate, Shard, Target
 
 __all__ = ["gen", "main"]
 
@@ -36,16 +40,25 @@ NAME = "deepmuon-gen"
 FILE = click.Path(path_type=Path)
 BETWEEN_LINES = 30.0  # s, of progress in a log
 
-CUTS = "every muon of the model is written: keep those you want when you read the file"
+CHARGE = "muons of both charges are written: keep those you want when you read the file"
 MEDIA = "the released models are under water; deepmuon-train transport takes their muons through other materials"
 LEADS = {
-    **dict.fromkeys(("--energy-min", "--energy-max", "--emin", "--emax", "--min-energy", "--max-energy"), CUTS),
-    **dict.fromkeys(("--zenith-min", "--zenith-max", "--charge", "--energy", "--zenith"), CUTS),
+    **dict.fromkeys(("--emin", "--min-energy"), "write --energy-min GEV"),
+    **dict.fromkeys(("--emax", "--max-energy"), "write --energy-max GEV"),
+    **dict.fromkeys(("--min-zenith", "--theta-min"), "write --zenith-min DEGREES"),
+    **dict.fromkeys(("--max-zenith", "--theta-max"), "write --zenith-max DEGREES"),
+    "--energy": "write --energy-min GEV and --energy-max GEV",
+    "--zenith": "write --zenith-min DEGREES and --zenith-max DEGREES",
+    "--charge": CHARGE,
+    **dict.fromkeys(("--target", "--surface", "--detector"), "write --plane, --sphere, --box or --cylinder"),
+    "--can": "write --cylinder RADIUS HEIGHT",
     **dict.fromkeys(("--material", "--medium", "--rock", "--density"), MEDIA),
     "--flux": "a model has its own, which is CRY's for the released ones",
-    **dict.fromkeys(("--format", "--csv", "--text", "--root"), "the file is HDF5, and deepmuon-csv writes text of it"),
+    **dict.fromkeys(
+        ("--csv", "--text", "--root", "--mcpl"), "the end of the file's name says its format: -o muons.mcpl"
+    ),
     **dict.fromkeys(("--gpu", "--cuda"), "write --device cuda"),
-    **dict.fromkeys(("--time", "--exposure", "--duration"), "write --live-time SECONDS --area M2"),
+    **dict.fromkeys(("--time", "--exposure", "--duration"), "write --live-time SECONDS, with --area M2 or a target"),
     **dict.fromkeys(("-N", "--n", "--muons", "--events", "--count", "--size"), "write -n 1e6"),
     **dict.fromkeys(("--cores", "--jobs", "-j", "-t"), "write --threads"),
     **dict.fromkeys(("--file", "--to"), "write -o muons.h5"),
@@ -64,11 +77,16 @@ VALUES = {
     "-n": r"[0-9.,_]+([eE][0-9]+)?",
     "--model": r".*\.onnx",
     "--architecture": r"quantile|transformer",
-    "-o": r".*\.(h5|hdf5|csv|root|txt)",
+    "-o": r".*\.(h5|hdf5|mcpl|csv|root|txt)(\.gz)?",
 }
 """What a word looks like whose option was forgotten."""
 
-RECORDED = ("depth", "architecture", "number", "live_time", "area", "seed", "shard", "device", "threads")
+CUTS = ("energy_min", "energy_max", "zenith_min", "zenith_max")
+TARGETS = ("plane", "sphere", "box", "cylinder")
+RECORDED = (
+    *("depth", "architecture", "number", "live_time", "area", *CUTS, *TARGETS),
+    *("seed", "shard", "device", "threads"),
+)
 """The options that a file records: numbers and names of ours. Names of files are not: they could hold a secret."""
 
 
@@ -98,10 +116,23 @@ RECORDED = ("depth", "architecture", "number", "live_time", "area", "seed", "sha
     "--live-time",
     type=seconds,
     metavar="SECONDS",
-    help="Instead of -n: the muons that cross --area in this time, a Poisson number at the model's rate.",
+    help="Instead of -n: the muons that come in this time, a Poisson number, each with its time.",
 )
-@click.option("--area", type=square_metres, metavar="M2", help="The horizontal area for --live-time.")
-@click.option("-o", "--output", type=FILE, metavar="FILE", help="The HDF5 file to be written.")
+@click.option("--area", type=square_metres, metavar="M2", help="With --live-time and no target: the horizontal area.")
+@click.option("--energy-min", type=gev, metavar="GEV", help="Lowest kinetic energy.")
+@click.option("--energy-max", type=gev, metavar="GEV", help="Highest kinetic energy.")
+@click.option("--zenith-min", type=degrees, metavar="DEGREES", help="Smallest zenith angle: 0 is from straight above.")
+@click.option("--zenith-max", type=degrees, metavar="DEGREES", help="Largest zenith angle, to 90.")
+@click.option(
+    "--plane", type=size, nargs=2, metavar="X Y", help="Put all muons on a horizontal rectangle of these metres."
+)
+@click.option("--sphere", type=size, metavar="R", help="Send all muons into a sphere of this radius.")
+@click.option("--box", type=size, nargs=3, metavar="X Y Z", help="Send all muons into a box of these widths, z up.")
+@click.option(
+    "--cylinder", type=size, nargs=2, metavar="R H", help="The same of an upright cylinder, radius and height."
+)
+@click.option("-o", "--output", type=FILE, metavar="FILE", help="The file to be written.")
+@click.option("--format", "form", type=FORMAT, help="Of the file; what the end of its name says if left out, or HDF5.")
 @click.option("--overwrite", is_flag=True, help="Replace an existing file, once the new one is complete.")
 @click.option("--seed", type=seed_number, metavar="SEED", help="0 to 2^64 - 1; a new one if left out.")
 @click.option(
@@ -135,7 +166,16 @@ def gen(
     number: int | None,
     live_time: float | None,
     area: float | None,
+    energy_min: float | None,
+    energy_max: float | None,
+    zenith_min: float | None,
+    zenith_max: float | None,
+    plane: tuple[float, ...] | None,
+    sphere: float | None,
+    box: tuple[float, ...] | None,
+    cylinder: tuple[float, ...] | None,
     output: Path | None,
+    form: str | None,
     overwrite: bool,
     seed: int | None,
     shard: Shard | None,
@@ -144,10 +184,11 @@ def gen(
     quiet: bool,
     list_only: bool,
 ) -> None:
-    """Write cosmic-ray muons to an HDF5 file.
+    """Write cosmic-ray muons to a file: HDF5 (.h5), or .mcpl, .mcpl.gz, .root, .csv or .csv.gz by the end of its name.
 
-    The muons cross a horizontal plane downwards, at sea level (--depth 0) or under water: kinetic energy in
-    GeV, direction of motion (u, v, w) with z up, and pdg_id, 13 for mu- and -13 for mu+.
+    The muons cross a horizontal plane downwards, at sea level (--depth 0) or under water, or enter a body: kinetic
+    energy in GeV, direction of motion (u, v, w) with z up, and pdg_id, 13 for mu- and -13 for mu+. With a target they
+    have places (x, y, z) in metres from its centre, with --live-time a time in seconds.
 
     Ten million muons ten metres under water:
 
@@ -158,6 +199,17 @@ def gen(
 
     \b
         deepmuon-gen --depth 0 --live-time 3600 --area 4 --seed 1 -o hour.h5
+
+    Those that hit a box of 4 m x 4 m x 3 m ten metres under water in one minute, each with the place where it
+    enters and its time; a family of models is needed for a body:
+
+    \b
+        deepmuon-gen --depth 10 --box 4 4 3 --live-time 60 -o tank.h5
+
+    Those of 10 GeV and more that come from 60 to 90 degrees:
+
+    \b
+        deepmuon-gen --depth 0 --energy-min 10 --zenith-min 60 -n 1e5 -o slanting.h5
 
     The first of 100 parts of ten billion muons, which 100 jobs of a batch farm make:
 
@@ -183,32 +235,50 @@ def gen(
     _check_model_options(depth, architecture, model)
     if model is None:
         _check_released(depth, architecture)
-    _check_number_options(number, live_time, area)
+    sizes = {"plane": plane, "sphere": None if sphere is None else (sphere,), "box": box, "cylinder": cylinder}
+    given = {name: numbers for name, numbers in sizes.items() if numbers is not None}
+    _check_target_options(given)
+    _check_number_options(number, live_time, area, has_target=bool(given))
     if shard is not None and seed is None:
         raise click.UsageError("--shard needs a --seed, the same for all shards: without it each would have its own")
     if output is None:
         raise click.UsageError("where to? Give the name of a file: -o muons.h5")
 
-    from deepmuon_runtime import Generator, new_seed
+    from deepmuon_runtime import Cuts, Generator, new_seed
+    from deepmuon_runtime.formats.registry import output_format
     from deepmuon_runtime.latents.shard import WHOLE_RUN
-    from deepmuon_runtime.muon_file.output import check_muon_output
+    from deepmuon_runtime.targets.by_name import target_of
 
-    check_muon_output(output, overwrite, [] if model is None else [model])
+    cuts = Cuts(energy_min, energy_max, zenith_min, zenith_max)
+    target = next((target_of(name, numbers) for name, numbers in given.items()), None)
+    output_format(output, form).check_output(output, overwrite, [] if model is None else [model])
     generator = Generator.open(depth, architecture, file=model, device=device, threads=threads)
     seed = new_seed() if seed is None else seed
-    attributes: dict[str, object] = {"command_line": _command_line(context)}
-    if live_time is not None and area is not None:
-        number = generator.number_in_live_time(live_time, area, seed)
-        attributes |= {"live_time_s": live_time, "area_m2": area}
-    assert number is not None
+    total = number
+    if live_time is not None:
+        total = generator.number_in_live_time(live_time, area, seed, cuts=cuts, target=target)
+    assert total is not None
     shard = shard or WHOLE_RUN
-    count = len(shard.numbers(number))
+    count = len(shard.numbers(total))
     with _progress(count, hidden=quiet) as progress:
         generator.write(
-            output, number, seed, shard=shard, overwrite=overwrite, progress=progress, attributes=attributes
+            output,
+            number,
+            seed,
+            shard=shard,
+            cuts=cuts,
+            target=target,
+            live_time=live_time,
+            area=area,
+            format=form,
+            overwrite=overwrite,
+            progress=progress,
+            attributes={"command_line": _command_line(context)},
         )
     if not quiet:
-        click.echo(_closing_line(output, count, time.perf_counter() - started, generator, seed))
+        rate = generator.rate(cuts=cuts, target=target)
+        facts = _facts(count, time.perf_counter() - started, generator.device, rate, target, seed)
+        click.echo(f"{output}: {', '.join(facts)}")
 
 
 def main() -> NoReturn:
@@ -231,11 +301,19 @@ def _check_released(depth: float | None, architecture: str | None) -> None:
         released_model(depth, architecture)
 
 
-def _check_number_options(number: int | None, live_time: float | None, area: float | None) -> None:
-    if (live_time is None) != (area is None):
-        raise click.UsageError("--live-time and --area go together")
+def _check_target_options(given: Mapping[str, object]) -> None:
+    if len(given) > 1:
+        names = " and ".join(f"--{name}" for name in given)
+        raise click.UsageError(f"there is one target: {names} don't go together")
+
+
+def _check_number_options(number: int | None, live_time: float | None, area: float | None, has_target: bool) -> None:
+    if has_target and area is not None:
+        raise click.UsageError("a target has its own area: leave out --area")
+    if not has_target and (live_time is None) != (area is None):
+        raise click.UsageError("--live-time and --area go together, where there is no target")
     if number is None and live_time is None:
-        raise click.UsageError("how many muons? Give -n (as in -n 1e7), or --live-time and --area")
+        raise click.UsageError("how many muons? Give -n (as in -n 1e7), or --live-time and --area or a target")
     if number is not None and live_time is not None:
         raise click.UsageError("-n goes without --live-time: the live time decides the number")
 
@@ -243,11 +321,15 @@ def _check_number_options(number: int | None, live_time: float | None, area: flo
 def _command_line(context: click.Context) -> str:
     """Return the command with those of its options that may be recorded."""
     given = [
-        (option.opts[-1], str(context.params[option.name]))
+        (option.opts[-1], *_texts(context.params[option.name]))
         for option in context.command.params
         if option.name in RECORDED and context.get_parameter_source(option.name) == ParameterSource.COMMANDLINE
     ]
     return shlex.join([NAME, *chain.from_iterable(given)])
+
+
+def _texts(value: object) -> list[str]:
+    return [str(part) for part in (value if isinstance(value, tuple) else [value])]
 
 
 def _print_models() -> None:
@@ -295,15 +377,19 @@ class _Lines:
             click.echo(f"{NAME}: {self._done:,} of {self._number:,} muons", err=True)
 
 
-def _closing_line(output: Path, number: int, seconds: float, generator: Generator, seed: int) -> str:
-    rate = generator.model.rate_hz_per_m2
-    facts = [
+def _facts(number: int, seconds: float, device: str, rate: Rate | None, target: Target | None, seed: int) -> list[str]:
+    """Return what the closing line says."""
+    live_time = "rate unknown"
+    if rate is not None and target is not None:
+        live_time = f"live time {number / rate.hz:,.1f} s of the {target.name} at {rate.hz:,.5g} a second"
+    elif rate is not None:
+        live_time = f"equivalent live time {number / rate.hz:,.1f} s for 1 m2"
+    return [
         f"{number:,} muons in {seconds:.2f} s",
-        f"{number / seconds:,.0f} muons/s on {generator.device}",
-        "rate unknown" if rate is None else f"equivalent live time {number / rate:,.1f} s for 1 m2",
+        f"{number / seconds:,.0f} muons/s on {device}",
+        live_time,
         f"seed {seed}",
     ]
-    return f"{output}: {', '.join(facts)}"
 
 
 if __name__ == "__main__":

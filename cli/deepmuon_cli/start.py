@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from types import FrameType
     from typing import NoReturn
 
-__all__ = ["bake", "check", "csv", "gen", "merge", "plot"]
+__all__ = ["bake", "check", "convert", "gen", "merge", "plot"]
 
 NAMES = {getattr(_signal, name): name for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(_signal, name)}
 
@@ -30,9 +30,9 @@ def check() -> NoReturn:
     _start("check")
 
 
-def csv() -> NoReturn:
-    """Run `deepmuon-csv`."""
-    _start("csv")
+def convert() -> NoReturn:
+    """Run `deepmuon-convert`."""
+    _start("convert")
 
 
 def gen() -> NoReturn:

@@ -21,6 +21,7 @@ const problem = element("error", HTMLElement);
 
 const PREVIEW = 1 << 15; // muons of a spectrum that moves with the slider
 const PREVIEW_SEED = 1n;
+const BETWEEN_PICTURES = 50; // ms: drawing each block would take longer than making it
 
 class App {
     /** @param {import("./models.js").Released} released */
@@ -107,16 +108,20 @@ class App {
             await this.engine.ask("start", number, seed);
             status.textContent = `Making ${count(number)} muons ${place(model.depth_m)} …`;
             const begun = performance.now();
-            let [made, seconds] = [0, 0];
+            let [made, seconds, drawn] = [0, 0, 0];
             let coming = this.engine.ask("more");
             while (made < number && !this.stopped) {
                 const progress = await coming;
+                const now = performance.now();
                 made = progress.tally.count;
-                seconds = (performance.now() - begun) / 1000;
-                if (made < number && !this.stopped) coming = this.engine.ask("more"); // while this draws
-                bar.value = made / number;
+                seconds = (now - begun) / 1000;
                 this.blocks = progress.blocks;
+                const isLast = made >= number || this.stopped;
+                if (!isLast) coming = this.engine.ask("more"); // while this draws
+                if (!isLast && now - drawn < BETWEEN_PICTURES) continue;
+                bar.value = made / number;
                 this.results.show(progress, model, surface, seconds);
+                drawn = now;
             }
             this.fileName = `muons-${model.architecture}-${model.depth_m}m-seed-${seed}.csv`;
             this.results.showCommand(model, made, seed);

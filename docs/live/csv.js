@@ -1,4 +1,4 @@
-/** Muons as text, a line each: the columns of `deepmuon-csv`. */
+/** Muons as text, a line each: the columns of `deepmuon-convert`. */
 
 export const CSV_HEADER = "kinetic_energy_GeV,u,v,w,pdg_id\n";
 

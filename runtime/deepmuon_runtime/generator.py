@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections.abc
+import math
 import os
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -10,41 +11,33 @@ from contextlib import closing
 from itertools import chain, pairwise
 from numbers import Integral, Real
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from deepmuon_runtime.errors import FailedError, RefusedError, first_line
-from deepmuon_runtime.latents.philox import checked_seed, fill_latents, new_seed
-from deepmuon_runtime.latents.poisson import poisson
+from deepmuon_runtime.cuts import NO_CUTS, Cuts
+from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.formats.registry import output_format
+from deepmuon_runtime.latents.arrivals import Arrivals
+from deepmuon_runtime.latents.philox import checked_seed, new_seed
 from deepmuon_runtime.latents.shard import WHOLE_RUN, Shard
-from deepmuon_runtime.model.metadata import LATENTS_PER_MUON, SPHERE, Model
+from deepmuon_runtime.model.metadata import SPHERE
 from deepmuon_runtime.model.released import read_released, released_model
-from deepmuon_runtime.muon_file.format import BYTES_PER_MUON
-from deepmuon_runtime.muon_file.output import check_muon_output
-from deepmuon_runtime.muon_file.writer import MuonWriter
-from deepmuon_runtime.muons import MU_PLUS, Muons
+from deepmuon_runtime.muon_file.format import COLUMNS, OPTIONAL_COLUMNS, PLACE, bytes_per_muon
+from deepmuon_runtime.muons import Muons
 from deepmuon_runtime.ordered_map import ordered_map
-from deepmuon_runtime.physical import check_physical
 from deepmuon_runtime.room import check_disk, check_memory
+from deepmuon_runtime.sampling.numbers import checked_numbers
+from deepmuon_runtime.sampling.selection import Rate, Selection
+from deepmuon_runtime.sampling.surfaces import Surfaces
+from deepmuon_runtime.targets.target import Target
 
-if TYPE_CHECKING:
-    import onnxruntime
+__all__ = ["Generator"]
 
-    from deepmuon_runtime.model.bound_run import BoundRun
+MOST_EXPECTED = 1e12
+"""The most muons that a live time may be expected to give."""
 
-__all__ = ["LARGEST_NUMBER", "Generator", "checked_numbers"]
-
-LARGEST_NUMBER = 2**53
-"""The most muons of one run."""
-
-# Muons of one run of the network, about: what it works on stays in a CPU's cache; a GPU wants much at once.
-BLOCK = {"cpu": 1 << 14, "cuda": 1 << 18}
-PIECE = {"cpu": 1 << 17, "cuda": 1 << 18}  # muons of one task of a thread, and of one write, in whole blocks
-TRIED = 5  # values of the latents, before the first muons: the ends, the middle, and two between
-
-Outputs = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int8]]  # energy, direction, charge
+RARE = 1e-6  # share of the muons, below which cuts are said to be narrow
 
 
 class Generator:
@@ -72,14 +65,12 @@ class Generator:
     (1000, True)
     """
 
-    def __init__(self, session: onnxruntime.InferenceSession, model: Model, device: str, threads: int) -> None:
-        self.model = model
-        self.device = device
+    def __init__(self, surfaces: Surfaces, threads: int) -> None:
+        self.model = surfaces.own.model
+        self.device = surfaces.own.device
         self.threads = threads
-        self._session = session
-        self._stream = model.stream
-        self._block_draws = _block_draws(model, device)
-        self._own = threading.local()  # each thread's memory for its runs
+        self._surfaces = surfaces
+        self._selections: dict[tuple[Cuts, Target | None], Selection] = {}
 
     @classmethod
     def open(
@@ -112,7 +103,7 @@ class Generator:
         RefusedError
             If there is no such model or depth, it breaks the contract, or the device can't be had.
         """
-        from deepmuon_runtime.model.opening import checked_model, load_model, read_file
+        from deepmuon_runtime.model.opening import read_file
 
         threads = _usable_processors() if threads is None else threads
         if not isinstance(threads, Integral) or threads < 1:
@@ -127,16 +118,20 @@ class Generator:
             released = released_model(depth, architecture)
             name, contents = released.name, read_released(released)
             depth = depth if released.is_family else None
-        contents, model = checked_model(contents, name, depth)
-        if file is not None:
-            cls._try_memory(contents, model)
-        session, model, device = load_model(contents, model, device)
-        generator = cls(session, model, device, threads)
-        generator._try(TRIED)
-        return generator
+        return cls(Surfaces(contents, name, depth, device, is_stranger=file is not None), threads)
 
-    def sample(self, n: int, seed: int | None = None, *, first: int = 0) -> Muons:
-        """Return n muons as columns, all in memory.
+    def sample(
+        self,
+        n: int | None = None,
+        seed: int | None = None,
+        *,
+        first: int = 0,
+        cuts: Cuts = NO_CUTS,
+        target: Target | None = None,
+        live_time: float | None = None,
+        area: float | None = None,
+    ) -> Muons:
+        """Return n muons, or those of a live time, as columns, all in memory.
 
         Parameters
         ----------
@@ -146,6 +141,14 @@ class Generator:
             0 to 2^64 - 1; one from the operating system if left out.
         first
             Number of the first of them among the muons of the seed.
+        cuts
+            Bounds of energy and zenith angle; all n muons are within.
+        target
+            What all n muons hit: they then have places. A body needs the flux through a sphere, which families have.
+        live_time
+            Seconds, instead of n: the muons that come in this time, a Poisson number, each with its time.
+        area
+            With it, the horizontal area in m2 that they cross; a target has its own.
 
         Returns
         -------
@@ -154,36 +157,46 @@ class Generator:
         Raises
         ------
         RefusedError
-            If n, `first`, their sum or the seed is out of range, or the memory does not hold n muons.
+            If n, `first`, their sum or the seed is out of range, the memory does not hold n muons, or there are none
+            of these cuts and this target.
         FailedError
             If the model gives an unphysical muon.
         """
-        numbers, seed = checked_numbers(n, first), _seed(seed)
+        run = self._run(n, seed, first, cuts, target, live_time, area)
         instead = "take them in chunks, or write a file"
-        check_memory(len(numbers) * BYTES_PER_MUON, f"{n} muons", instead)
+        count = len(run.numbers)
+        check_memory(count * bytes_per_muon(run.columns), f"{count} muons", instead)
         try:
-            muons = Muons.empty(len(numbers))
+            muons = run.empty(count)
         except (MemoryError, ValueError) as error:
-            raise RefusedError(f"{n} muons do not fit in memory: {instead}") from error
+            raise RefusedError(f"{count} muons do not fit in memory: {instead}") from error
 
         def fill(part: range) -> None:
-            self._fill(muons[part.start - numbers.start : part.stop - numbers.start], seed, part.start)
+            run.fill(muons[part.start - run.numbers.start : part.stop - run.numbers.start], part)
 
-        for _ in ordered_map(fill, self._parts(numbers), self.threads):
+        for _ in ordered_map(fill, run.parts(), self.threads, run.stop.set):
             pass
         return muons
 
     def chunks(
-        self, n: int, seed: int | None = None, *, first: int = 0
+        self,
+        n: int | None = None,
+        seed: int | None = None,
+        *,
+        first: int = 0,
+        cuts: Cuts = NO_CUTS,
+        target: Target | None = None,
+        live_time: float | None = None,
+        area: float | None = None,
     ) -> collections.abc.Generator[Muons, None, None]:
-        """Yield n muons in pieces of about a hundred thousand, for those who stream.
+        """Yield the muons of `sample` in pieces of a hundred thousand or fewer, for those who stream.
 
         The memory needed does not grow with n. The pieces one after the other are `sample(n, seed, first=first)`.
         Whoever stops before the end should close the iterator (`contextlib.closing`), which stops the threads.
 
         Parameters
         ----------
-        n, seed, first
+        n, seed, first, cuts, target, live_time, area
             As for `sample`.
 
         Raises
@@ -191,36 +204,37 @@ class Generator:
         RefusedError, FailedError
             As `sample`.
         """
-        numbers, seed = checked_numbers(n, first), _seed(seed)
-
-        def chunk(part: range) -> Muons:
-            muons = Muons.empty(len(part))
-            self._fill(muons, seed, part.start)
-            return muons
-
-        return ordered_map(chunk, self._parts(numbers), self.threads)
+        return self._chunks(self._run(n, seed, first, cuts, target, live_time, area))
 
     def write(
         self,
         path: str | Path,
-        n: int,
+        n: int | None = None,
         seed: int | None = None,
         *,
         shard: Shard = WHOLE_RUN,
+        cuts: Cuts = NO_CUTS,
+        target: Target | None = None,
+        live_time: float | None = None,
+        area: float | None = None,
+        format: str | None = None,
         overwrite: bool = False,
         progress: Callable[[int], object] | None = None,
         attributes: Mapping[str, object] | None = None,
     ) -> None:
-        """Write n muons, or a shard of them, to an HDF5 file, which appears under its name only when it is complete.
+        """Write the muons of `sample`, or a shard of them, to a file, which appears only when it is complete.
 
         Parameters
         ----------
         path
             The file; its folder must exist.
-        n, seed
-            As for `sample`; the file records the seed.
+        n, seed, cuts, target, live_time, area
+            As for `sample`; the file records them.
         shard
-            Which part of the n muons. The shards of one seed, made on any machines, together are the n muons.
+            Which part of the muons. The shards of one seed, made on any machines, together are all.
+        format
+            A name of `formats.registry.FORMATS`: "h5", "mcpl", "mcpl.gz", "root", "csv" or "csv.gz". What the end of
+            the file's name says if left out, and HDF5 if that says nothing.
         overwrite
             Whether an existing file may be replaced.
         progress
@@ -231,178 +245,221 @@ class Generator:
         Raises
         ------
         RefusedError
-            If n or the seed is out of range, `path` can't be written, or its disk is too small.
+            As `sample`, or if `path` can't be written, or its disk is too small.
         FailedError
             If the model gives an unphysical muon, writing fails, or another process writes `path` meanwhile.
         """
-        total, seed = len(checked_numbers(n)), _seed(seed)
-        numbers = shard.numbers(total)
-        folder = check_muon_output(path, overwrite).parent
-        check_disk(folder, len(numbers) * BYTES_PER_MUON, f"{len(numbers):,} muons")
-        described = {**self._attributes(seed, shard, total), **(attributes or {})}
-        chunks = self.chunks(len(numbers), seed, first=numbers.start)
-        with MuonWriter(path, described, overwrite) as writer, closing(chunks):
+        form = output_format(path, format)
+        folder = form.check_output(path, overwrite).parent
+        whole = self._run(n, seed, 0, cuts, target, live_time, area)
+        run = whole._replace(numbers=shard.numbers(len(whole.numbers)))
+        check_disk(folder, len(run.numbers) * form.bytes_per_muon(run.columns), f"{len(run.numbers):,} muons")
+        described = {
+            **self._attributes(run, shard, len(whole.numbers)),
+            **({} if live_time is None else {"live_time_s": live_time}),
+            **({} if area is None else {"area_m2": area}),
+            **(attributes or {}),
+        }
+        optional = set(run.columns) - set(COLUMNS)
+        chunks = self._chunks(run)
+        with form.writer(path, described, overwrite, optional=optional) as writer, closing(chunks):
             for muons in chunks:
                 writer.append(muons)
                 if progress is not None:
                     progress(len(muons))
 
-    def number_in_live_time(self, live_time: float, area: float, seed: int) -> int:
-        """Draw the number of muons that cross a horizontal area: a Poisson number at the model's rate.
+    def rate(self, *, cuts: Cuts = NO_CUTS, target: Target | None = None) -> Rate | None:
+        """Return how many muons come a second, that cuts keep and that hit a target.
 
-        Of a model whose muons cross a sphere, the area is that of its cross-section.
+        By a fixed integration: it is the same each time, whatever has been sampled.
+
+        Parameters
+        ----------
+        cuts, target
+            As for `sample`.
+
+        Returns
+        -------
+        Rate, that of a m2 of the model's surface where there is no target; None where the model does not know its own.
+
+        Raises
+        ------
+        RefusedError
+            If there are no such muons.
+        """
+        return self._selection(cuts, target).rate
+
+    def fraction_kept(self, cuts: Cuts, target: Target | None = None) -> float:
+        """Return the share of all muons, of those that hit the target where there is one, that cuts keep."""
+        return self._selection(cuts, target).share
+
+    def number_in_live_time(
+        self,
+        live_time: float,
+        area: float | None = None,
+        seed: int = 0,
+        *,
+        cuts: Cuts = NO_CUTS,
+        target: Target | None = None,
+    ) -> int:
+        """Return how many muons come in a live time: a Poisson number at their rate.
 
         Parameters
         ----------
         live_time
             Seconds.
         area
-            Square metres.
+            Square metres of a horizontal plane, of a sphere those of its cross-section; none with a target.
         seed
             0 to 2^64 - 1; the number has random numbers of its own, apart from the muons of that seed.
+        cuts, target
+            As for `sample`.
 
         Raises
         ------
         RefusedError
-            If the model does not know its rate, or the expected number is not above 0 and at most 2^53.
+            If the model does not know its rate, or the expected number is not above 0 and at most 10^12.
         """
-        if self.model.rate_hz_per_m2 is None:
+        return self._arrivals(self._selection(cuts, target), live_time, area, checked_seed(seed)).count
+
+    def _run(
+        self,
+        n: int | None,
+        seed: int | None,
+        first: int,
+        cuts: Cuts,
+        target: Target | None,
+        live_time: float | None,
+        area: float | None,
+    ) -> _Run:
+        """Return what is asked for, in one."""
+        seed = new_seed() if seed is None else checked_seed(seed)
+        if live_time is None:
+            if area is not None:
+                raise RefusedError("an area goes with a live time: give it, or leave out the area")
+            numbers = checked_numbers(n, first)
+            return _Run(self._selection(cuts, target), numbers, seed, None, threading.Event())
+        if n is not None or first != 0:
+            raise RefusedError("the live time decides the number of muons: leave out n and first")
+        selection = self._selection(cuts, target)
+        arrivals = self._arrivals(selection, live_time, area, seed)
+        return _Run(selection, range(arrivals.count), seed, arrivals, threading.Event())
+
+    def _selection(self, cuts: Cuts, target: Target | None) -> Selection:
+        try:
+            known = self._selections.get((cuts, target))
+        except TypeError as error:
+            raise RefusedError(f"{target!r} is no target: it is not hashable, as a frozen dataclass is") from error
+        if known is not None:
+            return known
+        if not isinstance(cuts, Cuts):
+            raise RefusedError(f"{cuts!r} are no cuts: give for instance Cuts(energy_min=1)")
+        if target is not None and not isinstance(target, Target):
+            raise RefusedError(f"{target!r} is no target: give for instance Box(4, 4, 3)")
+        selection = Selection(self._surfaces.of(target), cuts, target)
+        selection.warn_if_rarer_than(RARE)
+        if target is not None:
+            self._surfaces.warn_of_height(target)
+        self._selections[cuts, target] = selection
+        return selection
+
+    def _arrivals(self, selection: Selection, live_time: float, area: float | None, seed: int) -> Arrivals:
+        if selection.rate is None:
             raise RefusedError(f"{self.model.name} does not know its rate: give a number of muons")
-        for number, meaning in ((live_time, "live time in seconds"), (area, "area in m2")):
+        if selection.target is not None and area is not None:
+            raise RefusedError(f"the {selection.target.name} has its own area: leave out the area")
+        size = 1.0 if selection.target is not None else area
+        for number, meaning in ((live_time, "live time in seconds"), (size, "area in m2")):
             if not isinstance(number, Real):
                 raise RefusedError(f"{number!r} is no {meaning}: a number is")
-        mean = self.model.rate_hz_per_m2 * live_time * area
-        if not 0 < mean <= LARGEST_NUMBER:
+        assert size is not None
+        rate = selection.rate.hz * size
+        if not 0 < rate * live_time <= MOST_EXPECTED or not math.isfinite(live_time):
+            where = f"on {area:g} m2" if selection.target is None else f"on the {selection.target.name}"
             raise RefusedError(
-                f"{mean:g} muons are expected in {live_time:g} s on {area:g} m2, and should be 0 to 2^53"
+                f"{rate * live_time:g} muons are expected in {live_time:g} s {where}, and should be 0 to 10^12"
             )
-        return poisson(mean, checked_seed(seed), self._stream)
+        return Arrivals(rate, seed, selection.source.model.stream, float(live_time))
 
-    def _attributes(self, seed: int, shard: Shard, total: int) -> dict[str, object]:
-        model = self.model
-        rates = {
-            "rate_hz_per_m2": model.rate_hz_per_m2,
-            "rate_uncertainty_hz_per_m2": model.rate_uncertainty_hz_per_m2,
-        }
-        return {
+    def _chunks(self, run: _Run) -> collections.abc.Generator[Muons, None, None]:
+        def chunk(part: range) -> Muons:
+            muons = run.empty(len(part))
+            run.fill(muons, part)
+            return muons
+
+        return ordered_map(chunk, run.parts(), self.threads, run.stop.set)
+
+    def _attributes(self, run: _Run, shard: Shard, total: int) -> dict[str, object]:
+        selection, target = run.selection, run.selection.target
+        model = selection.source.model
+        said: dict[str, object] = {
             "depth_m": model.depth_m,
             "medium": model.medium,
-            "seed": np.uint64(seed),
-            "first": shard.numbers(total).start,
+            "seed": np.uint64(run.seed),
+            "first": run.numbers.start,
             "total": total,
             "shard": str(shard),
             "model_sha256": model.sha256,
             "architecture": model.architecture,
             "device": self.device,
-            **{name: rate for name, rate in rates.items() if rate is not None},
-            **({"surface": model.surface} if model.surface == SPHERE else {}),
         }
+        if model.surface == SPHERE:
+            said["surface"] = SPHERE
+        if selection.cuts:
+            said |= {**selection.cuts.attributes, "fraction_kept": selection.share}
+        if target is not None:
+            said |= {"target": target.name, "target_size_m": [float(size) for size in target.size]}
+        names = ("rate_hz_per_m2", "rate_uncertainty_hz_per_m2")
+        if target is not None:
+            names = ("target_rate_hz", "target_rate_uncertainty_hz")
+        numbers = selection.rate or (None, None)
+        return said | {name: number for name, number in zip(names, numbers, strict=True) if number is not None}
 
-    def _parts(self, numbers: range) -> Iterator[range]:
+
+class _StoppedError(Exception):
+    """Nobody waits for the muons any more."""
+
+
+class _Run(NamedTuple):
+    """Muons that are asked for: which ones, and what they are made of."""
+
+    selection: Selection
+    numbers: range
+    seed: int
+    arrivals: Arrivals | None
+    stop: threading.Event
+
+    @property
+    def columns(self) -> list[str]:
+        """The names of their columns."""
+        place = PLACE if self.selection.target is not None else ()
+        time = [name for name in OPTIONAL_COLUMNS if name not in PLACE] if self.arrivals is not None else []
+        return [*COLUMNS, *place, *time]
+
+    def empty(self, n: int) -> Muons:
+        """Return n muons whose columns are yet to be filled."""
+        return Muons.empty(n, has_place=self.selection.target is not None, has_time=self.arrivals is not None)
+
+    def fill(self, muons: Muons, part: range) -> None:
+        """Make some of them."""
+        self.selection.fill(muons, self.seed, part.start, self._check_wanted)
+        if self.arrivals is not None:
+            assert muons.time is not None
+            muons.time[:] = self.arrivals.times(part)
+
+    def parts(self) -> Iterator[range]:
         """Cut the numbers of muons at multiples of many blocks; the first part makes a file's chunks: no small one."""
-        block = self._block_draws * self.model.muons_per_draw
-        size = -(-PIECE[self.device] // block) * block
+        numbers, size = self.numbers, self.selection.piece
         first_end = -(-numbers.start // size) * size + size
         edges = chain([numbers.start], range(first_end, numbers.stop, size), [numbers.stop])
         return (range(start, stop) for start, stop in pairwise(edges) if numbers)
 
-    def _fill(self, muons: Muons, seed: int, first: int) -> None:
-        """Make the muons from number `first` on, block by block."""
-        size = self._block_draws * self.model.muons_per_draw
-        run = self._thread_run()
-        done = 0
-        while done < len(muons):
-            block, skipped = divmod(first + done, size)
-            part = muons[done : done + size - skipped]
-            fill_latents(run.latent, seed, block * self._block_draws, self._stream)
-            self._run(run, skipped, part)
-            check_physical(part, self.model.energy_min_gev, self.model.energy_max_gev, first + done)
-            done += len(part)
-
-    def _thread_run(self) -> BoundRun:
-        """Return the run of blocks that belongs to this thread."""
-        from deepmuon_runtime.model.bound_run import BoundRun
-
-        if not hasattr(self._own, "run"):
-            muons = self._block_draws * self.model.muons_per_draw
-            self._own.run = BoundRun(self._session, self.device, self._block_draws, self.model.latent_size, muons)
-        run: BoundRun = self._own.run
-        return run
-
-    def _run(self, run: Callable[[], Outputs], skipped: int, muons: Muons) -> None:
-        """Run the model, leave out the first muons, and keep as many as asked for."""
-        try:
-            energy, direction, charge = run()
-        except Exception as error:  # ONNX Runtime's own classes have no common base
-            from deepmuon_runtime.model.trial import memory_asked
-
-            reason = memory_asked(error) or first_line(error)
-            raise FailedError(f"the model {self.model.name} failed: {reason}") from error
-        kept = slice(skipped, skipped + len(muons))
-        muons.kinetic_energy[:] = energy[kept]
-        for axis, column in enumerate((muons.u, muons.v, muons.w)):
-            column[:] = direction[kept, axis]
-        np.multiply(charge[kept], np.int8(MU_PLUS), out=muons.pdg_id)
-
-    @classmethod
-    def _try_memory(cls, contents: bytes, model: Model) -> None:
-        """Refuse a model of which a block of muons takes too much memory, before it is loaded for good."""
-        from deepmuon_runtime.model.contract import check_signature
-        from deepmuon_runtime.model.trial import open_for_trial, returning_memory
-
-        session = open_for_trial(contents, model.name)
-        check_signature(session, model)
-        generator = cls(session, model, "cpu", threads=1)
-        for draws in (TRIED, generator._block_draws):
-            generator._try(draws, returning_memory())
-
-    def _try(self, draws: int, options: onnxruntime.RunOptions | None = None) -> None:
-        """Refuse a model that fails at the ends or in the middle of its latents, in so many draws."""
-        values = np.resize(np.linspace(-1, 1, TRIED, dtype=np.float32), draws)
-        latent = np.repeat(values[:, None], self.model.latent_size, axis=1)
-        muons = Muons.empty(len(latent) * self.model.muons_per_draw)
-
-        def run() -> Outputs:
-            from deepmuon_runtime.model.contract import INPUT, OUTPUTS
-
-            energy, direction, charge = self._session.run(OUTPUTS, {INPUT: latent}, options)
-            if not len(energy) == len(direction) == len(charge) == len(muons):
-                raise ValueError(
-                    f"it gave {len(energy)} energies, {len(direction)} directions and {len(charge)} charges, "
-                    f"and should give {len(muons)} each"
-                )
-            return energy, direction, charge
-
-        try:
-            self._run(run, 0, muons)
-            check_physical(muons, self.model.energy_min_gev, self.model.energy_max_gev)
-        except FailedError as error:
-            raise RefusedError(f"{self.model.name} breaks the contract in a trial: {error}") from error
-
-
-def _block_draws(model: Model, device: str) -> int:
-    """Return how many draws make a block: of large ones, which each thread has in memory, as few as one."""
-    size = max(model.muons_per_draw, model.latent_size // LATENTS_PER_MUON)
-    # Multiples of 8 draws where they fit: a block then begins with a whole step of the random number generator.
-    step = 8 if 8 * size <= BLOCK[device] else 1
-    return -(-BLOCK[device] // (step * size)) * step
+    def _check_wanted(self) -> None:
+        if self.stop.is_set():
+            raise _StoppedError
 
 
 def _usable_processors() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-def checked_numbers(n: float, first: float = 0) -> range:
-    """Return the numbers of n muons from `first` on, or raise RefusedError where there are none."""
-    for number, meaning in ((n, "number of muons"), (first, "number of a first muon")):
-        if not isinstance(number, Real) or not 0 <= number <= LARGEST_NUMBER or number % 1 != 0:
-            raise RefusedError(f"{number!r} is no {meaning}: a whole number from 0 to 2^53 is")
-    if first + n > LARGEST_NUMBER:
-        raise RefusedError(f"{n} muons from number {first} on end after number 2^53")
-    return range(int(first), int(first) + int(n))
-
-
-def _seed(seed: int | None) -> int:
-    return new_seed() if seed is None else checked_seed(seed)

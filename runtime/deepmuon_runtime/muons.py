@@ -20,7 +20,7 @@ MU_PLUS = -13
 
 @dataclass(frozen=True)
 class Muons:
-    """Muons crossing a horizontal plane, one array per column, all of one length n.
+    """Muons that cross a horizontal plane or enter a target, one array per column, all of one length n.
 
     Parameters
     ----------
@@ -30,6 +30,11 @@ class Muons:
         Direction of motion, a unit vector; z is up, so w < 0 is downward.
     pdg_id : int8 [n]
         13 for mu-, -13 for mu+.
+    x, y, z : float32 [n] or None
+        Where the muon crosses the plane or enters the target, in metres from its centre, z up; None where the muons
+        have no place.
+    time : float64 [n] or None
+        When, in seconds from the beginning of the live time; None where the muons have no time.
     """
 
     kinetic_energy: NDArray[np.float32]
@@ -37,6 +42,15 @@ class Muons:
     v: NDArray[np.float32]
     w: NDArray[np.float32]
     pdg_id: NDArray[np.int8]
+    x: NDArray[np.float32] | None = None
+    y: NDArray[np.float32] | None = None
+    z: NDArray[np.float32] | None = None
+    time: NDArray[np.float64] | None = None
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """The columns that are there, by name."""
+        return {name: column for name, column in vars(self).items() if column is not None}
 
     @property
     def charge(self) -> NDArray[np.int8]:
@@ -54,13 +68,15 @@ class Muons:
 
     def __getitem__(self, index: slice | NDArray[Any]) -> Muons:
         """Select muons by a slice (views), a mask or an array of positions (copies)."""
-        return Muons(**{name: getattr(self, name)[index] for name in self.__dataclass_fields__})
+        return Muons(**{name: column[index] for name, column in self.columns.items()})
 
     @classmethod
-    def empty(cls, n: int) -> Muons:
+    def empty(cls, n: int, *, has_place: bool = False, has_time: bool = False) -> Muons:
         """Return n muons whose columns are yet to be filled."""
         energy, u, v, w = (np.empty(n, np.float32) for _ in range(4))
-        return cls(energy, u, v, w, np.empty(n, np.int8))
+        place = {axis: np.empty(n, np.float32) for axis in ("x", "y", "z")} if has_place else {}
+        time = np.empty(n, np.float64) if has_time else None
+        return cls(energy, u, v, w, np.empty(n, np.int8), **place, time=time)
 
     @classmethod
     def of(cls, kinetic_energy: ArrayLike, u: ArrayLike, v: ArrayLike, w: ArrayLike, pdg_id: ArrayLike) -> Muons:
@@ -70,6 +86,6 @@ class Muons:
 
     @classmethod
     def concatenate(cls, parts: Sequence[Muons]) -> Muons:
-        """Join several sets, in order."""
-        names = cls.__dataclass_fields__
+        """Join several sets, all with the same columns, in order."""
+        names = parts[0].columns
         return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})

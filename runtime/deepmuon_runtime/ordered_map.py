@@ -19,7 +19,10 @@ Result = TypeVar("Result")
 
 
 def ordered_map(
-    function: Callable[[Item], Result], items: Iterable[Item], threads: int
+    function: Callable[[Item], Result],
+    items: Iterable[Item],
+    threads: int,
+    abandon: Callable[[], object] = lambda: None,
 ) -> Generator[Result, None, None]:
     """Yield `function(item)` for each item, in order, computed ahead by threads.
 
@@ -33,12 +36,14 @@ def ordered_map(
         How many run side by side; fewer where the system refuses to start so many, or the memory is limited, and none
         but the caller's at worst.
         As many results again may wait for the caller, and 8 at most.
+    abandon
+        Called at the end, also where the caller stops before it: what still runs may then stop too.
     """
     rest = iter(items)
     threads = affordable(threads)
     while threads:
         refused: list[Item] = []
-        yield from _mapped(function, rest, threads, refused)
+        yield from _mapped(function, rest, threads, refused, abandon)
         if not refused:
             return
         rest = chain(refused, rest)
@@ -47,7 +52,11 @@ def ordered_map(
 
 
 def _mapped(
-    function: Callable[[Item], Result], items: Iterator[Item], threads: int, refused: list[Item]
+    function: Callable[[Item], Result],
+    items: Iterator[Item],
+    threads: int,
+    refused: list[Item],
+    abandon: Callable[[], object],
 ) -> Generator[Result, None, None]:
     """Do so by exactly so many threads; where one can't be started, stop and leave its item in `refused`."""
     pending: deque[Future[Result]] = deque()
@@ -65,4 +74,6 @@ def _mapped(
         while pending:
             yield pending.popleft().result()
     finally:
+        if not refused:  # else the rest is computed by fewer
+            abandon()
         pool.shutdown(cancel_futures=True)

@@ -12,10 +12,16 @@ from pathlib import Path
 
 from studies.shared.processes import REPOSITORY, cores, program
 
-__all__ = ["DEFAULT", "Commands", "Contestant", "contestants", "deepmuon_gen", "own_job"]
+__all__ = ["DEFAULT", "OLD", "SAMPLE", "Commands", "Contestant", "contestants", "deepmuon_gen", "own_job"]
 
 DEFAULT = "deepmuon-gen"
 """The contestant that the others are compared with."""
+
+OLD = "0.1.0"
+"""The release that this one is compared with."""
+
+SAMPLE = "sample() to memory"
+SAMPLE_CODE = "import sys; from deepmuon_runtime import Generator; Generator.open(0).sample(int(sys.argv[1]), 1)"
 
 Commands = Callable[[int, int, Path], list[list[str]]]
 """From a count, a seed and an empty folder to the commands that are run side by side."""
@@ -45,7 +51,7 @@ class Contestant:
     writes: bool = True
 
 
-def contestants(folder: Path, cry: Path | None, ecomug: Path | None) -> Iterator[Contestant]:
+def contestants(folder: Path, cry: Path | None, ecomug: Path | None, old: Path | None) -> Iterator[Contestant]:
     """Yield all that can be had here.
 
     Parameters
@@ -54,11 +60,19 @@ def contestants(folder: Path, cry: Path | None, ecomug: Path | None) -> Iterator
         For files that they need.
     cry, ecomug
         The user's binaries.
+    old
+        The folder of an environment in which release 0.1.0 is installed.
     """
     for name, binary in (("CRY", cry), ("EcoMug", ecomug)):
         if binary:
             yield Contestant(name, per_core([str(binary)]), 0.04)
     yield Contestant(DEFAULT, deepmuon_gen("--depth", "0"))
+    yield Contestant(SAMPLE, own_python([sys.executable], SAMPLE_CODE), 0.1, writes=False)
+    if old:
+        apart = ["env", "-u", "PYTHONPATH"]  # which may lead to this tree
+        yield Contestant(OLD, deepmuon_gen("--depth", "0", start=[*apart, str(old / "bin" / DEFAULT)]))
+        python = [*apart, str(old / "bin" / "python")]
+        yield Contestant(f"{SAMPLE}, {OLD}", own_python(python, SAMPLE_CODE), 0.1, writes=False)
     yield Contestant(f"{DEFAULT}, a tenth as many", deepmuon_gen("--depth", "0"), 0.1)
     yield Contestant("library, no file", own_job("library"), writes=False)
     yield Contestant("NumPy, table of the inverse CDF", per_core(job("inverse-cdf")), 0.1, writes=False)
@@ -79,13 +93,19 @@ def contestants(folder: Path, cry: Path | None, ecomug: Path | None) -> Iterator
         print("The transformer of the paper's size is left out: deepmuon-training is not installed.", file=sys.stderr)
 
 
-def deepmuon_gen(*model: str) -> Commands:
-    """Return the commands of one deepmuon-gen."""
+def deepmuon_gen(*model: str, name: str = "muons.h5", start: list[str] | None = None) -> Commands:
+    """Return the commands of one deepmuon-gen, that of another release if it is started otherwise."""
 
     def commands(count: int, seed: int, folder: Path) -> list[list[str]]:
-        return [[program(DEFAULT), *model, "-n", str(count), "--seed", str(seed), "-q", "-o", str(folder / "muons.h5")]]
+        words = [*(start or [program(DEFAULT)]), *model]
+        return [[*words, "-n", str(count), "--seed", str(seed), "-q", "-o", str(folder / name)]]
 
     return commands
+
+
+def own_python(python: list[str], code: str) -> Commands:
+    """Return the commands of one Python that runs code with the count as its argument."""
+    return lambda count, seed, folder: [[*python, "-c", code, str(count)]]
 
 
 def own_job(*names: str) -> Commands:

@@ -40,15 +40,26 @@ Row = dict[str, Any]
 @click.option("-n", "--number", type=float, default=1e8, show_default=True, help="Muons; the slow make fewer.")
 @click.option("--cry", type=PROGRAM, help="A program that makes muons by CRY.")
 @click.option("--ecomug", type=PROGRAM, help="A program that makes muons by EcoMug.")
+@click.option(
+    "--old",
+    type=click.Path(exists=True, file_okay=False, path_type=Path, resolve_path=True),
+    help="The folder of an environment with release 0.1.0.",
+)
 @click.option("--linear", is_flag=True, help="Also 0.01, 0.1, 1 and 10 times as many muons, each once.")
 @click.option("--output", type=FILE, help="Also write OUTPUT.json, OUTPUT.md and, with Matplotlib, OUTPUT.png.")
 def main(
-    repetitions: int, number: float, cry: Path | None, ecomug: Path | None, linear: bool, output: Path | None
+    repetitions: int,
+    number: float,
+    cry: Path | None,
+    ecomug: Path | None,
+    old: Path | None,
+    linear: bool,
+    output: Path | None,
 ) -> None:
     """Run, print, write."""
     with tempfile.TemporaryDirectory() as folder:
         compared = []
-        for contestant in contestants(Path(folder), cry, ecomug):
+        for contestant in contestants(Path(folder), cry, ecomug, old):
             once(contestant.commands, 1, seed=1)  # one that fails should do so now; others find their files in memory
             compared.append(contestant)
         rows = race(compared, int(number), repetitions)
@@ -90,6 +101,7 @@ def row(contestant: Contestant, count: int, runs: list[Taken], starts: list[floa
         "name": contestant.name,
         "muons": count,
         "seconds": [run.seconds for run in runs],
+        "processor_seconds": [run.processor_seconds for run in runs],
         "muons_per_second": count / median(run.seconds for run in runs),
         "peak_memory": max(run.peak_memory for run in runs),
         "start_seconds": median(starts),
@@ -144,7 +156,16 @@ def as_text(report: dict[str, Any]) -> str:
 
 def race_rows(rows: list[Row]) -> Iterable[tuple[str, ...]]:
     """Return the rows of the first table."""
-    yield "", "muons", "million muons/s", "deepmuon-gen is faster by", "peak memory", "start", "bytes/muon"
+    yield (
+        "",
+        "muons",
+        "million muons/s",
+        "deepmuon-gen is faster by",
+        "core-ns/muon",
+        "peak memory",
+        "start",
+        "bytes/muon",
+    )
     best = next(line["muons_per_second"] for line in rows if line["name"] == DEFAULT)
     for line in rows:
         size = line["bytes_per_muon"]
@@ -153,6 +174,7 @@ def race_rows(rows: list[Row]) -> Iterable[tuple[str, ...]]:
             f"{line['muons']:,}",
             f"{line['muons_per_second'] / 1e6:.3g}",
             f"{best / line['muons_per_second']:.3g}",
+            f"{median(line['processor_seconds']) / line['muons'] * 1e9:.3g}",
             f"{line['peak_memory'] / 1e6:.0f} MB",
             f"{line['start_seconds']:.2f} s",
             "" if size is None else f"{size:.1f}",

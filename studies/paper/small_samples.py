@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from deepmuon_runtime import Generator, Muons, read_muons
 from deepmuon_training.data.cry_cells import COS_ZENITH_EDGES
-from deepmuon_training.generators.quantile.fit import QuantileSchedules
+from deepmuon_training.generators.quantile.fit import QuantileSettings
 from deepmuon_training.generators.transformer.fit import TransformerSettings
 from deepmuon_training.learning.descent import Schedule
 from deepmuon_training.reports.pictures import STYLE
@@ -39,7 +39,7 @@ SMALL = 6_000
 REPETITIONS = 10
 GENERATED = 2_000_000
 SETTINGS: dict[str, Any] = {
-    "quantile": QuantileSchedules(),
+    "quantile": QuantileSettings(),
     "transformer": TransformerSettings(
         batch=8192,
         schedule=Schedule(

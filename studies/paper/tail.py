@@ -20,13 +20,17 @@ from numpy.typing import NDArray
 from scipy.stats import kstest, poisson
 
 from deepmuon_runtime import Generator, Model, Muons
-from deepmuon_training.learning.power_law import TAIL_MUONS
 from deepmuon_training.reports.pictures import STYLE
 from studies.shared.report import COLOURS, write
 
 SEED = 1
-PROBABILITIES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
-LIMIT = re.compile(r"Above ([\d.e+]+) GeV.* the flux above E goes as E\^-([\d.]+), up to ([\d.e+]+) GeV")
+LEVEL = 1e-6
+"""Probability of a muon beyond which the card tells of a power law."""
+
+PROBABILITIES = (1e-6, 1e-7, 1e-8, 1e-9)
+LIMIT = re.compile(
+    r"Above ([\d.e+]+) GeV, which one muon in a million has, .* goes as E\^-([\d.]+), up to ([\d.e+]+) GeV"
+)
 
 Float = NDArray[np.float64]
 
@@ -87,7 +91,7 @@ def power_law(model: Model) -> PowerLaw:
     if found is None:
         raise click.ClickException(f"the card of {model.name} tells of no power law")
     lowest, exponent, highest = map(float, found.groups())
-    return PowerLaw(TAIL_MUONS / int(model.metadata["training_muons"]), lowest, exponent, highest)
+    return PowerLaw(LEVEL, lowest, exponent, highest)
 
 
 def tail(generator: Generator, number: int, lowest: float) -> Muons:

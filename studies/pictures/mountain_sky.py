@@ -22,20 +22,14 @@ from deepmuon_training.fluxes.ecomug import sea_level_muons
 from deepmuon_training.generators.fit import fit_generator
 from deepmuon_training.generators.fitted import FittedGenerator, export_fitted
 from deepmuon_training.generators.quantile.azimuth_fit import AZIMUTH_SCHEDULE
-from deepmuon_training.generators.quantile.fit import QuantileSchedules
-from deepmuon_training.generators.quantile.regression import RegressionSteps
-from deepmuon_training.learning.charge import CHARGE_SCHEDULE
+from deepmuon_training.generators.quantile.fit import QuantileSettings
 from deepmuon_training.sample import Sample
 from studies.pictures.mountain import behind_mountain, skyline
 from studies.shared.processes import REPOSITORY
 
 PICTURE = REPOSITORY / "docs" / "images" / "mountain.png"
 MUONS = 1_500_000
-SETTINGS = QuantileSchedules(
-    zenith=RegressionSteps(adam=300, round=50, rounds=2),
-    charge=replace(CHARGE_SCHEDULE, steps=50),
-    azimuth=replace(AZIMUTH_SCHEDULE, steps=1000),
-)
+SETTINGS = QuantileSettings(azimuth=replace(AZIMUTH_SCHEDULE, steps=1000))
 ENERGIES = {"below 3 GeV": (0.0, 3.0), "3 to 30 GeV": (3.0, 30.0), "above 30 GeV": (30.0, np.inf)}
 LOW = 0.6
 """Cosine of the zenith angle below which a muon is low in the sky."""

@@ -23,6 +23,9 @@ class Taken(NamedTuple):
     seconds: float
     """From its start to its end."""
 
+    processor_seconds: float
+    """Of all its threads and processes, in the program and in the system."""
+
     peak_memory: int
     """Bytes, at the highest; of several processes side by side the sum, each with its children."""
 
@@ -52,8 +55,9 @@ def take(commands: Sequence[Sequence[str]], folder: Path) -> Taken:
     for command, (_, status, _) in zip(commands, ends, strict=True):
         if status:
             sys.exit(f"this failed: {' '.join(command)}")
+    processor_seconds = sum(usage.ru_utime + usage.ru_stime for _, _, usage in ends)
     peak_memory = sum(usage.ru_maxrss for _, _, usage in ends) * (1 if sys.platform == "darwin" else 1024)
-    return Taken(seconds, peak_memory, sum(file.stat().st_size for file in folder.iterdir()))
+    return Taken(seconds, processor_seconds, peak_memory, sum(file.stat().st_size for file in folder.iterdir()))
 
 
 def cores() -> int:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from support.commands import wait_for_answers
 from support.damage import DAMAGES, cut_out, overwrite, repeat, truncate
+from support.tiny_families import tiny_family
 from support.tiny_models import tiny_model
 
 from deepmuon_runtime import Generator, Shard, list_models, merge_shards, read_muons
@@ -55,12 +56,17 @@ def limit(kind: int, low: float, high: float, inputs: Inputs, random: Random, fo
 
 
 def model(inputs: Inputs, random: Random, folder: Path) -> None:
-    """Run a damaged model: refused, ended by a bad muon, or muons that can be."""
+    """Run a damaged model, or bake one: refused, ended by a bad muon, or muons that can be."""
     released = [read_released(one) for one in list_models() if one.depth_m == 0]
-    whole = [tiny_model(), tiny_model(8), *released][random.integers(2 + len(released))]
-    (folder / "model.onnx").write_bytes(DAMAGES[random.integers(len(DAMAGES))](whole, random))
-    words = ["--model", "model.onnx", "-n", 20_000, "--seed", 1, "-q", "-o", "output.h5"]
-    code, err = ended(start("gen", words, folder))
+    models = [tiny_model(), tiny_model(8), tiny_family(), *released]
+    (folder / "model.onnx").write_bytes(
+        DAMAGES[random.integers(len(DAMAGES))](models[random.integers(len(models))], random)
+    )
+    depth = ["--depth", 0 if random.random() < 0.5 else 13.7]  # which a model of one depth does not take
+    bake = ["model.onnx", *depth, "-q", "-o", "output.onnx"]
+    make = ["--model", "model.onnx", "-n", 20_000, "--seed", 1, "-q", "-o", "output.h5"]
+    choices = [("gen", make), ("gen", [*make, *depth]), ("bake", bake)]
+    code, err = ended(start(*choices[random.integers(3)], folder))
     see(code in (0, 1, 2), f"exit code {code}, {err!r}")
     see_line(code, err)
     see_outputs(folder)

@@ -78,6 +78,8 @@ def see_outputs(folder: Path, is_killed: bool = False) -> None:
             see(is_killed, f"{path.name} was left")
         elif path.suffix == ".h5":
             see(check_file(path).defects == [], f"{path.name} has defects")
+        elif path.suffix == ".onnx":
+            Generator.open(file=path, device="cpu")  # a refusal is a fault
         else:
             content = path.read_bytes()
             lines = [line for line in content.splitlines() if not line.startswith(b"#")]

@@ -221,6 +221,20 @@ def test_of_runs_at_the_same_time_one_wins(tmp_path, tiny_file):
         (tmp_path / "muons.h5").unlink()
 
 
+@pytest.mark.parametrize("name", ["mcpl", "mcpl.gz", "root", "csv", "csv.gz"])
+def test_in_every_format_a_run_that_is_ended_while_it_writes_leaves_nothing_under_the_name(tmp_path, tiny_file, name):
+    output = f"muons.{name}"
+    for number, code in ((signal.SIGTERM, 128 + signal.SIGTERM), (signal.SIGKILL, -signal.SIGKILL)):
+        words = [COMMAND, "--model", tiny_file, "-n", str(MANY), "-q", "-o", output]
+        process = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+        wait_until(lambda: any(path.stat().st_size > 1_000_000 for path in tmp_path.glob(f"{output}.*")))
+        process.send_signal(number)
+        assert ended(process)[0] == code
+        left = [path.name for path in tmp_path.iterdir()]
+        assert output not in left
+        assert left == [] or number == signal.SIGKILL
+
+
 def test_a_model_that_gives_a_bad_muon_ends_the_run_with_its_number_and_leaves_nothing(tmp_path):
     (tmp_path / "bad.onnx").write_bytes(tiny_model(edits=RARELY_BAD))
     (tmp_path / "here").mkdir()

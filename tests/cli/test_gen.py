@@ -89,15 +89,14 @@ def test_no_name_of_a_file_is_recorded(gen, model_file):
         ),
         ("/dev/stdout", "/dev/stdout is a device or a pipe: give the name of a regular file"),
         (
-            "muons.csv",
-            "muons.csv would be HDF5 under a name of text: write muons.h5, and then deepmuon-csv muons.h5",
+            "muons.txt",
+            "muons.txt would be HDF5 under a name of text: write muons.h5, and then",
         ),
-        ("muons.root", "muons.root would be HDF5 under a name of ROOT: write muons.h5, and then read it in Python"),
         ("muons.parquet", "muons.parquet would be HDF5 under a name of Parquet"),
-        ("muons.mcpl", "muons.mcpl would be HDF5 under a name of MCPL"),
+        ("muons.h5.gz", "muons.h5.gz would be HDF5 under a name of a packed file"),
     ],
 )
-def test_an_output_that_promises_what_is_not_hdf5_is_refused(tmp_path, model_file, output, reason):
+def test_an_output_that_promises_what_is_not_written_is_refused(tmp_path, model_file, output, reason):
     """With stdout a pipe."""
     words = [*COMMAND, "--model", str(model_file), "-n", "10", "-o", output]
     before = set(tmp_path.iterdir())
@@ -252,6 +251,15 @@ def test_a_family_of_ones_own_takes_a_depth(gen, family_file):
     assert read_attributes("muons.h5")["depth_m"] == 13.7
     assert read_attributes("default.h5")["depth_m"] == 10
     assert read_attributes("muons.h5")["model_sha256"] == hashlib.sha256(family_file.read_bytes()).hexdigest()
+
+
+def test_the_shards_of_a_depth_are_parts_of_its_muons(gen, family_file):
+    options = ["--model", family_file, "--depth", "13.7", "-n", "1000", "--seed", 7, "--shard", "2/3"]
+    code, _, err = gen(*options, "-o", "muons.h5")
+    assert (code, err) == (0, "")
+    whole = Generator.open(13.7, file=family_file).sample(1000, seed=7)
+    assert np.array_equal(read_muons("muons.h5").kinetic_energy, whole.kinetic_energy[333:666])
+    assert read_attributes("muons.h5")["depth_m"] == 13.7
 
 
 def test_a_depth_that_a_family_of_ones_own_has_not_is_refused_with_the_range(gen, family_file):
@@ -495,10 +503,11 @@ def test_an_option_that_is_misspelt_is_told_with_the_nearest_one(gen):
         ("--out muons.h5", "did you mean --output?"),
         ("--Depth 10", "did you mean --depth?"),
         ("--depht 10", "did you mean --depth?"),
-        ("--energy-min 1", "keep those you want when you read the file"),
+        ("--charge 1", "keep those you want when you read the file"),
         ("--material G4_ROCK", "deepmuon-train transport takes their muons through other materials"),
         ("--flux cry", "a model has its own"),
-        ("--format csv", "deepmuon-csv writes text"),
+        ("--csv", "the end of the file's name says its format: -o muons.mcpl"),
+        ("--format text -o muons.h5", "'text' is not one of 'h5', 'mcpl', 'mcpl.gz', 'root', 'csv', 'csv.gz'"),
         ("--gpu", "write --device cuda"),
         ("--xyzzy", "deepmuon-gen --help lists"),
     ],

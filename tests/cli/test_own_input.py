@@ -7,7 +7,7 @@ from support.own_input import assert_own_input_is_refused
 
 COMMANDS = {
     "gen": "deepmuon-gen --model {} -n 10",
-    "csv": "deepmuon-csv {}",
+    "convert": "deepmuon-convert {}",
     "plot": "deepmuon-plot other {}",
 }
 

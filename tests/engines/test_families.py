@@ -7,17 +7,33 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.engines import ENGINES, TOLERANCE, Engine, Muons, difference, run_in_onnxruntime
+from support.engines import (
+    ENGINES,
+    FAMILIES,
+    MODELS,
+    TOLERANCE,
+    Engine,
+    Muons,
+    difference,
+    expected,
+    latents_of,
+    run_in_onnxruntime,
+)
 from support.tiny_families import tiny_family
 
 from deepmuon_runtime.latents.philox import latents
 from deepmuon_runtime.model.baking import bake
-from deepmuon_runtime.model.family import at_depth
+from deepmuon_runtime.model.family import at_depth, read_model
 
 DRAWS = 2000
 BAKED_ONLY = ("OpenCV, module dnn",)
 """Engines that run models of one depth alone: they calculate nothing while they load."""
 JAVASCRIPT = ("ONNX Runtime in Node.js", "ONNX Runtime in WebAssembly")
+
+
+def baked_from(model: Path) -> str | None:
+    """Return the hash of the family that a model was taken out of, if it was."""
+    return read_model(model.read_bytes(), model.name).metadata.get("baked_from")
 
 
 def here(name: str) -> Engine:
@@ -70,6 +86,17 @@ def test_the_depth_that_javascript_sets_is_pythons(tmp_path: Path, depth, right,
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_baked_model_gives_the_same_muons_everywhere(tmp_path: Path, depth, right, name: str):
     assert_same(here(name).run(model(tmp_path, "baked", bake(tiny_family(), depth))), right)
+
+
+@pytest.mark.parametrize("name", [name for name in ENGINES if name not in BAKED_ONLY])
+@pytest.mark.parametrize("fixed", [model for model in MODELS if baked_from(model)], ids=lambda model: model.stem)
+def test_a_released_family_gives_the_vectors_of_what_was_baked_of_it(tmp_path: Path, fixed: Path, name: str):
+    (family,) = FAMILIES
+    vectors = {"draws": len(latents_of(fixed)), "latent": latents_of(fixed).flatten().tolist()}
+    placed = at_depth(family.read_bytes(), read_model(fixed.read_bytes(), fixed.name).depth_m)
+    (tmp_path / "family.json").write_text(json.dumps(vectors))
+    (tmp_path / "family.onnx").write_bytes(placed)
+    assert_same(here(name).run(tmp_path / "family.onnx"), expected(fixed))
 
 
 def test_another_depth_is_seen(tmp_path: Path, depth, right):

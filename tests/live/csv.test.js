@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { CSV_HEADER, csvLines } from "../../docs/live/csv.js";
 
-test("each muon is a line with the columns of deepmuon-csv", () => {
+test("each muon is a line with the columns of deepmuon-convert", () => {
     const text = csvLines({
         energy: Float32Array.of(1.5, 1000),
         direction: Float32Array.of(0, 0.6, -0.8, 0, 0, -1),

@@ -15,15 +15,23 @@ function tallyOf(...rows) {
     return tally;
 }
 
+/** @param {number} energy */
+function bin(energy) {
+    const float = Float32Array.of(energy);
+    return EnergyBins.index(float[0], new Uint32Array(float.buffer)[0]);
+}
+
 test("an energy is in the bin whose edges hold it", () => {
     for (let i = 0; i < 50; i++) {
         const [low, high] = EnergyBins.edges.slice(i, i + 2);
-        assert.equal(EnergyBins.index(Math.sqrt(low * high)), i + 1);
-        assert.equal(EnergyBins.index(low * 1.0001), i + 1);
-        assert.equal(EnergyBins.index(high * 0.9999), i + 1);
+        assert.equal(bin(Math.sqrt(low * high)), i + 1);
+        assert.equal(bin(low * 1.000001), i + 1);
+        assert.equal(bin(high * 0.999999), i + 1);
     }
-    assert.equal(EnergyBins.index(0.0099), 0);
-    assert.equal(EnergyBins.index(1001), 51);
+    assert.equal(bin(0.0099), 0);
+    assert.equal(bin(1e-30), 0);
+    assert.equal(bin(1001), 51);
+    assert.equal(bin(1e38), 51);
 });
 
 test("the vertical and the horizon are in the outermost bins", () => {

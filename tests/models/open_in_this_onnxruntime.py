@@ -20,7 +20,7 @@ MUONS = 100_000
 def check(file: Path, entry: dict[str, str]) -> None:
     """Draw muons from a model and see that they are physical."""
     session = onnxruntime.InferenceSession(file.read_bytes(), providers=["CPUExecutionProvider"])
-    assert session.get_modelmeta().custom_metadata_map["deepmuon.contract_version"] == "1"
+    assert session.get_modelmeta().custom_metadata_map["deepmuon.contract_version"] == entry["contract_version"]
     latent_size, muons_per_draw = int(entry["latent_size"]), int(entry["muons_per_draw"])
     draws = MUONS // muons_per_draw
     latent = 2 * np.random.default_rng(1).random((draws, latent_size), dtype=np.float32) - 1

@@ -9,30 +9,33 @@ import onnx
 import pytest
 
 from deepmuon_runtime import Generator, Model, list_models
-from deepmuon_runtime.model.released import default_architecture, read_released, released_model
+from deepmuon_runtime.model.released import default_architecture, read_released
 
 ARCHITECTURES = ("quantile", "transformer")
 DEPTHS = (0, 10, 20, 30, 40, 50)
 MEDIAN_ENERGIES = dict(zip(DEPTHS, (2.820, 3.144, 4.181, 5.272, 6.377, 7.487), strict=True))  # GeV, held-out muons
 POSITIVE = dict(zip(DEPTHS, (0.518, 0.503, 0.495, 0.491, 0.488, 0.485), strict=True))
 """Fraction of mu+ of the held-out muons: CRY's tables have more mu- at high energies."""
-LARGEST_FILE = 1_000_000  # bytes
+LARGEST_FILE, LARGEST_FAMILY = 1_000_000, 3_000_000  # bytes
 
 
-@pytest.fixture(params=[(depth, architecture) for architecture in ARCHITECTURES for depth in DEPTHS], ids=str)
+FIXED = [model for model in list_models() if not model.is_family]
+
+
+@pytest.fixture(params=list_models(), ids=lambda model: model.name)
 def model(request: pytest.FixtureRequest) -> Model:
-    return released_model(*request.param)
+    return request.param
 
 
 def test_both_architectures_come_for_every_depth():
     expected = {(architecture, depth) for architecture in ARCHITECTURES for depth in DEPTHS}
-    assert {(model.architecture, model.depth_m) for model in list_models()} == expected
+    assert {(model.architecture, model.depth_m) for model in FIXED} == expected
     assert default_architecture() in ARCHITECTURES
 
 
 def test_a_file_is_what_the_oldest_onnx_runtime_reads(model: Model):
     content = read_released(model)
-    assert len(content) <= LARGEST_FILE
+    assert len(content) <= (LARGEST_FAMILY if model.is_family else LARGEST_FILE)
     loaded = onnx.load_from_string(content)
     onnx.checker.check_model(loaded, full_check=True)
     assert loaded.ir_version <= 9
@@ -43,8 +46,21 @@ def test_a_file_is_what_the_oldest_onnx_runtime_reads(model: Model):
 
 
 def test_a_model_says_what_it_was_trained_on(model: Model):
-    keys = {"training_source", "training_smoothed", "training_muons", "training_seed", "boxcox_lambda", "energy_mean"}
+    keys = {"training_source", "training_smoothed", "training_muons", "training_seed"}
+    if not (model.is_family or "baked_from" in model.metadata):  # whose knots have a transform each
+        keys |= {"boxcox_lambda", "energy_mean"}
     assert keys <= model.metadata.keys()
+
+
+def test_what_is_baked_is_of_the_released_family():
+    families = {model.sha256 for model in list_models() if model.is_family}
+    assert {model.metadata["baked_from"] for model in FIXED if "baked_from" in model.metadata} <= families
+
+
+@pytest.mark.parametrize("architecture", ARCHITECTURES)
+@pytest.mark.parametrize("depth", DEPTHS)
+def test_a_model_knows_its_rate(architecture: str, depth: float):
+    model = Generator.open(depth, architecture, device="cpu").model
     assert model.rate_hz_per_m2 is not None
     assert model.rate_uncertainty_hz_per_m2 is not None
     assert 0 < model.rate_uncertainty_hz_per_m2 < 0.01 * model.rate_hz_per_m2
@@ -57,19 +73,23 @@ def test_a_model_has_its_card(model: Model):
         assert heading in card
 
 
-def test_a_model_gives_the_energies_directions_and_charges_of_its_depth(model: Model):
-    muons = Generator.open(model.depth_m, model.architecture, device="cpu").sample(200_000, seed=1)
+@pytest.mark.parametrize("fixed", FIXED, ids=lambda model: model.name)
+def test_a_model_gives_the_energies_directions_and_charges_of_its_depth(fixed: Model):
+    file = files("deepmuon_models").joinpath(fixed.name)
+    muons = Generator.open(file=str(file), device="cpu").sample(200_000, seed=1)
     # Of the held-out muons; the scores on the cards are the real judgement, this sees an exchange of files.
-    assert np.median(muons.kinetic_energy) == pytest.approx(MEDIAN_ENERGIES[model.depth_m], rel=0.03)
-    assert np.mean(muons.charge > 0) == pytest.approx(POSITIVE[model.depth_m], abs=0.01)
+    assert np.median(muons.kinetic_energy) == pytest.approx(MEDIAN_ENERGIES[fixed.depth_m], rel=0.03)
+    assert np.mean(muons.charge > 0) == pytest.approx(POSITIVE[fixed.depth_m], abs=0.01)
     assert muons.cos_zenith.mean(dtype=np.float64) == pytest.approx(0.80, abs=0.01)
     assert muons.u.mean(dtype=np.float64) == pytest.approx(0, abs=0.02)
     assert muons.v.mean(dtype=np.float64) == pytest.approx(0, abs=0.02)
+    by_depth = Generator.open(fixed.depth_m, fixed.architecture, device="cpu").sample(1000, seed=1)
+    assert np.array_equal(by_depth.kinetic_energy, muons.kinetic_energy[:1000])
 
 
 @pytest.mark.parametrize("architecture", ARCHITECTURES)
 def test_the_rate_falls_with_depth_as_the_surviving_fraction(architecture: str):
-    rates = [released_model(depth, architecture).rate_hz_per_m2 for depth in DEPTHS]
+    rates = [Generator.open(depth, architecture, device="cpu").model.rate_hz_per_m2 for depth in DEPTHS]
     # Of held-out CRY muons carried directly from sea level to each depth.
     assert np.divide(rates, rates[0]) == pytest.approx([1, 0.5045, 0.2695, 0.1642, 0.1094, 0.0775], rel=0.005)
 
@@ -79,7 +99,7 @@ def test_any_two_models_of_a_seed_have_nothing_in_common():
     n = 50_000
     energies = [
         Generator.open(model.depth_m, model.architecture, device="cpu").sample(n, seed=1).kinetic_energy
-        for model in list_models()
+        for model in FIXED
     ]
     correlations = np.corrcoef(np.log(energies))[np.triu_indices(len(energies), 1)]
     assert len(correlations) == 66

@@ -6,8 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from deepmuon_cli.csv import csv
-from deepmuon_runtime import Generator, RefusedError, merge_shards
+from deepmuon_runtime import Generator, RefusedError, convert_file, merge_shards
 from deepmuon_runtime.room import check_memory
 
 
@@ -32,8 +31,8 @@ def test_a_merge_that_the_disk_does_not_hold_is_refused_and_a_virtual_one_fits(f
 
 
 def test_text_that_the_disk_can_not_hold_is_refused(full_disk):
-    with pytest.raises(RefusedError, match=r"1,000 lines need 12 kB, and .* has 10 kB free"):
-        csv.main([f"{full_disk}/muons.h5", "-o", f"{full_disk}/muons.csv"], standalone_mode=False)
+    with pytest.raises(RefusedError, match=r"1,000 muons need 12 kB, and .* has 10 kB free"):
+        convert_file(full_disk / "muons.h5", full_disk / "muons.csv")
     assert not (full_disk / "muons.csv").exists()
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 __all__ = [
     "ENGINES",
+    "FAMILIES",
     "MODELS",
     "TOLERANCE",
     "Difference",
@@ -22,6 +23,7 @@ __all__ = [
     "Muons",
     "difference",
     "expected",
+    "latents_of",
     "reference_evaluator",
 ]
 
@@ -29,10 +31,12 @@ TESTS = Path(__file__).parents[1]
 RELEASED = TESTS.parent / "models" / "deepmuon_models"
 JAVASCRIPT = TESTS / "engines" / "node_modules"
 
-MODELS = tuple(
-    RELEASED / entry["file"] for entry in json.loads((RELEASED / "manifest.json").read_text("utf-8"))["models"]
-)
-"""The released models."""
+_MANIFEST = json.loads((RELEASED / "manifest.json").read_text("utf-8"))["models"]
+MODELS = tuple(RELEASED / entry["file"] for entry in _MANIFEST if "depth_min_m" not in entry)
+"""The released models of one depth."""
+
+FAMILIES = tuple(RELEASED / entry["file"] for entry in _MANIFEST if "depth_min_m" in entry)
+"""The released families."""
 
 OUTPUTS = ["kinetic_energy", "direction", "charge"]
 RATE = "rate_hz_per_m2"
@@ -89,7 +93,7 @@ def read_vectors(model: Path) -> dict[str, Any]:
     return json.loads(vectors_file(model).read_text("utf-8"))
 
 
-def latents(model: Path) -> np.ndarray:
+def latents_of(model: Path) -> np.ndarray:
     """Return the latents of a model's test vectors, float32 [draws, latent_size]."""
     vectors = read_vectors(model)
     return np.float32(vectors["latent"]).reshape(vectors["draws"], -1)
@@ -144,7 +148,7 @@ def run_in_onnxruntime(model: Path, provider: Any = "CPUExecutionProvider") -> M
     import onnxruntime
 
     session = onnxruntime.InferenceSession(model, providers=[provider])
-    return Muons(*session.run(OUTPUTS, {"latent": latents(model)}))
+    return Muons(*session.run(OUTPUTS, {"latent": latents_of(model)}))
 
 
 def no_cuda() -> str:
@@ -167,7 +171,7 @@ def reference_evaluator(model: Any) -> Any:
 
 
 def run_in_reference_evaluator(model: Path) -> Muons:
-    return Muons(*reference_evaluator(str(model)).run(OUTPUTS, {"latent": latents(model)}))
+    return Muons(*reference_evaluator(str(model)).run(OUTPUTS, {"latent": latents_of(model)}))
 
 
 def run_in_openvino(model: Path) -> Muons:
@@ -175,7 +179,7 @@ def run_in_openvino(model: Path) -> Muons:
 
     # Where a processor has units for bfloat16 or float16, OpenVINO takes them unless told not to.
     compiled = openvino.compile_model(model, "CPU", {"INFERENCE_PRECISION_HINT": "f32"})
-    found = compiled({"latent": latents(model)})
+    found = compiled({"latent": latents_of(model)})
     return Muons(*(found[name] for name in OUTPUTS))
 
 
@@ -183,7 +187,7 @@ def run_in_opencv(model: Path) -> Muons:
     import cv2
 
     network = cv2.dnn.readNetFromONNX(str(model))
-    network.setInput(latents(model), "latent")
+    network.setInput(latents_of(model), "latent")
     rate = [RATE] if RATE in network.getUnconnectedOutLayersNames() else []
     return Muons(*network.forward([*OUTPUTS, *rate])[: len(OUTPUTS)])  # all outputs or none
 
@@ -191,16 +195,8 @@ def run_in_opencv(model: Path) -> Muons:
 def run_in_tract(model: Path) -> Muons:
     import tract
 
-    # Its analysis of a transformer's shapes depends on an order that changes from run to run, and fails once in fifty
-    # ("Impossible to unify"); what it analyses it runs right. Who embeds tract has to load again, too.
-    for attempt in range(5):
-        try:
-            runnable = tract.onnx().load(model).into_model().into_runnable()
-            break
-        except tract.TractError as error:
-            if attempt == 4 or "Impossible to unify" not in str(error):
-                raise
-    found = runnable.run([latents(model)])
+    runnable = tract.onnx().load(model).into_model().into_runnable()
+    found = runnable.run([latents_of(model)])
     return Muons(*(tensor.to_numpy() for tensor in found[: len(OUTPUTS)]))
 
 

@@ -18,9 +18,8 @@ from deepmuon_training.export.exportable import Exportable
 from deepmuon_training.export.metadata import Training
 from deepmuon_training.export.onnx_export import export
 from deepmuon_training.fluxes.ecomug import plane_rate, sea_level_muons
-from deepmuon_training.generators.quantile.fit import QuantileSchedules, fit_quantile
+from deepmuon_training.generators.quantile.fit import fit_quantile
 from deepmuon_training.generators.quantile.maps import QuantileGenerator
-from deepmuon_training.generators.quantile.regression import RegressionSteps
 from deepmuon_training.generators.quantile.tables import QuantileTables, tabulate
 from deepmuon_training.generators.transformer.fit import TransformerSettings, fit_transformer
 from deepmuon_training.generators.transformer.model import ChargeTable, TransformerModel, radius_table
@@ -35,8 +34,6 @@ settings.load_profile("unhurried")
 SAMPLE_SIZE = 100_000
 
 CHARGE_SCHEDULE = Schedule(steps=120, learning_rate=0.02, averaging=0.95, validate_every=40)
-
-QUANTILE_SCHEDULES = QuantileSchedules(zenith=RegressionSteps(adam=600, round=100, rounds=3), charge=CHARGE_SCHEDULE)
 
 TRANSFORMER_SETTINGS = TransformerSettings(
     d=16,
@@ -93,7 +90,7 @@ def sample() -> Sample:
 
 @pytest.fixture(scope="session")
 def quantile(sample: Sample) -> QuantileGenerator:
-    return fit_quantile(sample.muons, seed=1, schedules=QUANTILE_SCHEDULES, progress=False)
+    return fit_quantile(sample.muons, seed=1, progress=False)
 
 
 @pytest.fixture(scope="session")

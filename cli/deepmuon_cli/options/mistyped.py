@@ -20,7 +20,7 @@ class HelpfulCommand(click.Command):
     Parameters
     ----------
     leads
-        What to say to options that users try in vain: `{"--format": "deepmuon-csv writes text"}`.
+        What to say to options that users try in vain: `{"--gpu": "write --device cuda"}`.
     values
         What a word that stands alone looks like if an option was forgotten: `{"-o": r".*\.h5"}`.
     **others

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from deepmuon_runtime import Shard
 
 __all__ = [
+    "degrees",
+    "gev",
     "metres",
     "muon_number",
     "number_from_zero",
@@ -21,6 +23,7 @@ __all__ = [
     "seconds",
     "seed_number",
     "shard_number",
+    "size",
     "square_metres",
     "thread_number",
 ]
@@ -28,6 +31,8 @@ __all__ = [
 # What users write after a number, and how many of the option's own units that is.
 MULTIPLES = {"k": 1e3, "m": 1e6, "million": 1e6, "g": 1e9, "b": 1e9, "billion": 1e9}
 METRES = {"m": 1, "metre": 1, "meter": 1, "cm": 0.01, "km": 1e3, "ft": 0.3048, "mwe": 1, "m.w.e.": 1, "m w.e.": 1}
+GEV = {"gev": 1, "ev": 1e-9, "kev": 1e-6, "mev": 1e-3, "tev": 1e3}
+DEGREES = {**dict.fromkeys(("degree", "deg", "°"), 1.0), **dict.fromkeys(("radian", "rad"), 180 / math.pi)}
 SQUARE_METRES = {"m2": 1, "m^2": 1, "m²": 1, "cm2": 1e-4, "cm^2": 1e-4, "cm²": 1e-4, "km2": 1e6, "km²": 1e6}
 SECONDS = {
     **dict.fromkeys(("s", "sec", "second"), 1.0),
@@ -47,7 +52,7 @@ def muon_number(text: str) -> int:
     click.BadParameter
         If it is no number, not whole, below 1, or above 2^53.
     """
-    from deepmuon_runtime.generator import LARGEST_NUMBER
+    from deepmuon_runtime.sampling.numbers import LARGEST_NUMBER
 
     try:
         number = Decimal(text)
@@ -148,6 +153,39 @@ def metres(text: str) -> float:
         If it is no number.
     """
     return _number(text, "number of metres", METRES)
+
+
+def size(text: str) -> float:
+    """Read a length in metres, of a target.
+
+    Raises
+    ------
+    click.BadParameter
+        If it is not a finite number above 0.
+    """
+    return _positive(text, metres(text))
+
+
+def gev(text: str) -> float:
+    """Read a kinetic energy in GeV; which there can be is the library's to say.
+
+    Raises
+    ------
+    click.BadParameter
+        If it is no number.
+    """
+    return _number(text, "number of GeV", GEV)
+
+
+def degrees(text: str) -> float:
+    """Read an angle in degrees; which there can be is the library's to say.
+
+    Raises
+    ------
+    click.BadParameter
+        If it is no number.
+    """
+    return _number(text, "number of degrees", DEGREES)
 
 
 def number_from_zero(text: str) -> float:

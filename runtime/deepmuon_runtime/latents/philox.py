@@ -19,9 +19,11 @@ from numpy.typing import NDArray
 from deepmuon_runtime.errors import RefusedError
 
 __all__ = [
+    "FOR_ATTEMPTS",
     "FOR_COUNT",
     "FOR_LATENTS",
     "FOR_POSITIONS",
+    "FOR_TIMES",
     "LARGEST_SEED",
     "checked_seed",
     "fill_latents",
@@ -37,7 +39,13 @@ FOR_COUNT = 1
 """The purpose of the words that decide how many muons a live time gives."""
 
 FOR_POSITIONS = 2
-"""The purpose of the words that put muons on a plane."""
+"""The purpose of the words that put muons on a plane, or where they enter a target."""
+
+FOR_TIMES = 3
+"""The purpose of the words that say when muons come."""
+
+FOR_ATTEMPTS = 4
+"""The purpose of the words of draws that were rejected and are made again (`again`)."""
 
 LARGEST_SEED = 2**64 - 1
 
@@ -72,7 +80,7 @@ def words(seed: int, stream: int, purpose: int, first: int, count: int) -> NDArr
     seed, stream
         0 to 2^64 - 1.
     purpose
-        `FOR_LATENTS`, `FOR_COUNT` or `FOR_POSITIONS`.
+        `FOR_LATENTS`, `FOR_COUNT`, `FOR_POSITIONS` or `FOR_TIMES`.
     first, count
         Which words.
 
@@ -111,8 +119,15 @@ def latents(seed: int, first: int, draws: int, latent_size: int, stream: int = 0
     return latent
 
 
-def fill_latents(latent: NDArray[np.float32], seed: int, first: int, stream: int = 0) -> None:
-    """Fill an array with the latents of consecutive draws; see `latents`.
+def fill_latents(
+    latent: NDArray[np.float32],
+    seed: int,
+    first: int,
+    stream: int = 0,
+    *,
+    purpose: int = FOR_LATENTS,
+) -> None:
+    """Fill an array with the latents of consecutive draws, or numbers like them for another purpose; see `latents`.
 
     Parameters
     ----------
@@ -124,10 +139,12 @@ def fill_latents(latent: NDArray[np.float32], seed: int, first: int, stream: int
         The first of the draws.
     stream
         As in `latents`.
+    purpose
+        As in `words`.
     """
     flat = latent.reshape(-1)
     first_word, skipped = divmod(first * latent.shape[1], 2)
-    philox, skipped_words = _philox(seed, stream, FOR_LATENTS, first_word)
+    philox, skipped_words = _philox(seed, stream, purpose, first_word)
     skipped += 2 * skipped_words
     done = 0
     while done < len(flat):
@@ -136,8 +153,8 @@ def fill_latents(latent: NDArray[np.float32], seed: int, first: int, stream: int
         raw |= ONE_HALF
         halves = raw.astype("<u8", copy=False).view("<i4")[skipped : skipped + len(flat) - done]
         part = flat[done : done + len(halves)]
-        part[:] = halves
-        part *= np.float32(2.0**-31)
+        # In one pass over the memory; the multiplication, by a power of 2, is exact.
+        np.multiply(halves, np.float32(2.0**-31), out=part, dtype=np.float32, casting="unsafe")
         done += len(part)
         skipped = 0
 

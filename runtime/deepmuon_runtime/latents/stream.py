@@ -35,8 +35,8 @@ def model_stream(architecture: str, flux: str, medium: str, surface: int, depth_
 
     Examples
     --------
-    >>> hex(model_stream("quantile", "cry", "G4_WATER", 0, 10))
-    '0x1001ef7b2994f7e6'
+    >>> hex(model_stream("quantile", "cry", "water", 0, 10))
+    '0xa55500202cca742a'
     """
     with np.errstate(over="ignore"):
         depth = np.float32(depth_m).astype("<f4").tobytes()

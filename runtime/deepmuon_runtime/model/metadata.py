@@ -81,6 +81,9 @@ class Model:
         unknown, and in a family that is not loaded: they go with the depth.
     rate_relative_uncertainty
         Of the rate, or None where unknown.
+    energy_latents
+        Which two latents the energy depends on, the coarse and the fine one, where it rises with them as the contract
+        says; None where that is not known.
     metadata
         All of it as text, without the prefix of the keys.
     """
@@ -104,6 +107,7 @@ class Model:
     rate_hz_per_m2: float | None
     rate_uncertainty_hz_per_m2: float | None
     rate_relative_uncertainty: float | None
+    energy_latents: tuple[int, int] | None
     metadata: Mapping[str, str]
 
     @classmethod
@@ -133,6 +137,7 @@ class Model:
         if values["energy_min_gev"] >= values["energy_max_gev"]:
             raise RefusedError(f"{name} breaks the contract: energy_min_gev is not below energy_max_gev")
         _check_depths(name, values)
+        _check_energy_latents(name, values)
         values["surface"] = values["surface"] or HORIZONTAL_PLANE
         values["flux"] = values["flux"] or _creator(values["created_by"])
         del values["contract_version"]
@@ -179,6 +184,11 @@ def is_name(text: str) -> bool:
     return text != "" and text.isprintable()
 
 
+def _two_latents(text: str) -> tuple[int, int]:
+    coarse, fine = map(int, text.split())
+    return coarse, fine
+
+
 def _count(largest: int) -> _Rule:
     return _Rule(int, lambda x: 1 <= x <= largest, f"a whole number from 1 to {largest}")
 
@@ -214,6 +224,9 @@ _OPTIONAL = {
     "rate_hz_per_m2": _POSITIVE,
     "rate_uncertainty_hz_per_m2": _NOT_NEGATIVE,
     "rate_relative_uncertainty": _NOT_NEGATIVE,
+    "energy_latents": _Rule(
+        _two_latents, lambda x: x[0] != x[1] and min(x) >= 0, "two positions of latents, as in 0 1"
+    ),
 }
 
 
@@ -250,6 +263,16 @@ def _check_depths(name: str, values: Mapping[str, Any]) -> None:
     if values["rate_hz_per_m2"] is not None or values["rate_uncertainty_hz_per_m2"] is not None:
         raise RefusedError(
             f"{name} breaks the contract: the rate of a family goes with the depth, and its metadata has one"
+        )
+
+
+def _check_energy_latents(name: str, values: Mapping[str, Any]) -> None:
+    """Refuse latents of the energy that are none of a muon's own."""
+    if values["energy_latents"] is None:
+        return
+    if values["muons_per_draw"] != 1 or max(values["energy_latents"]) >= values["latent_size"]:
+        raise RefusedError(
+            f"{name} breaks the contract: energy_latents goes with one muon a draw, and each is below latent_size"
         )
 
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Callable, Iterator, Mapping
-from datetime import datetime, timedelta
+from datetime import datetime, timedelta, timezone
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from deepmuon_runtime.errors import RefusedError
@@ -13,9 +16,19 @@ from deepmuon_runtime.latents.philox import LARGEST_SEED
 from deepmuon_runtime.latents.shard import Shard
 from deepmuon_runtime.model.metadata import Model, are_one_rate, is_name
 from deepmuon_runtime.muon_file.checksum import attributes_crc32, unlike
-from deepmuon_runtime.muon_file.format import ATTRIBUTES_CHECKSUM
+from deepmuon_runtime.muon_file.format import ATTRIBUTES_CHECKSUM, python_value
+from deepmuon_runtime.muon_file.place_and_time import choice_defects
 
-__all__ = ["ALWAYS", "attribute_defects", "checksum_defects", "is_generated", "sound_attributes", "value_defects"]
+__all__ = [
+    "ALWAYS",
+    "LIVE_TIMES",
+    "Description",
+    "attribute_defects",
+    "checksum_defects",
+    "is_generated",
+    "sound_attributes",
+    "value_defects",
+]
 
 ROUNDING = 1e-9  # relative, of a live time
 
@@ -165,7 +178,7 @@ def attribute_defects(attributes: Mapping[str, Any], model: Model | None) -> Ite
     sound = sound_attributes(attributes)
     yield from _shard_defects(sound)
     yield from _live_time_defects(sound)
-    yield from _choice_defects(sound)
+    yield from choice_defects(sound)
     if model is not None:
         yield from _model_defects(sound, model)
 
@@ -198,26 +211,120 @@ def _live_time_defects(sound: Mapping[str, Any]) -> Iterator[str]:
             yield f"the attribute {rate} is 0, and count is {sound['count']}"
 
 
-def _choice_defects(sound: Mapping[str, Any]) -> Iterator[str]:
-    for low, high in (("energy_min_gev", "energy_max_gev"), ("zenith_min_degrees", "zenith_max_degrees")):
-        if {low, high} <= sound.keys() and sound[low] >= sound[high]:
-            yield f"{low} is {sound[low]!r}, and should be below {high}, which is {sound[high]!r}"
-    if "target_size_m" in sound and "target" not in sound:
-        yield "target_size_m goes with target, which is not there"
-
-
 def _model_defects(sound: Mapping[str, Any], model: Model) -> Iterator[str]:
     if "depth_m" in sound and model.is_family and not model.has_depth(sound["depth_m"]):
         yield f"the attribute depth_m is {sound['depth_m']:g}, and its model {model.name} has {model.depths}"
         return
-    for name in ("depth_m", "medium", "architecture", "rate_hz_per_m2", "rate_uncertainty_hz_per_m2"):
+    for name in ("depth_m", "medium", "architecture"):
         expected, found = getattr(model, name), sound.get(name)
-        if model.is_family and "rate" in name and found and expected and are_one_rate(found, expected):
-            continue  # of another type of CPU
         if found != expected:
+            yield f"the attribute {name} is {_shown(found)}, and that of its model {model.name} is {_shown(expected)}"
+    yield from _rate_defects(sound, model)
+
+
+def _rate_defects(sound: Mapping[str, Any], model: Model) -> Iterator[str]:
+    """Yield how the rates are not those of the model."""
+    rate, kept = model.rate_hz_per_m2, sound.get("fraction_kept", 1.0)
+    if "target" in sound:
+        found = sound.get("target_rate_hz")
+        expected = (rate or 0.0) * math.prod(sound.get("target_size_m", [])) * kept
+        if rate and sound["target"] == "plane" and not (found and are_one_rate(found, expected)):
+            yield (
+                f"the attribute target_rate_hz is {_shown(found)}, and the rate of its model {model.name} makes "
+                f"{expected:.5g}"
+            )
+        return
+    for name in ("rate_hz_per_m2", "rate_uncertainty_hz_per_m2"):
+        expected, found = getattr(model, name), sound.get(name)
+        if "fraction_kept" in sound:
+            if name == "rate_hz_per_m2" and expected and not (found and are_one_rate(found, expected * kept)):
+                yield (
+                    f"the attribute {name} is {_shown(found)}, and that of its model {model.name}, "
+                    f"{_shown(expected)}, makes {expected * kept:.5g} with fraction_kept"
+                )
+        elif found != expected and not (model.is_family and found and expected and are_one_rate(found, expected)):
             yield f"the attribute {name} is {_shown(found)}, and that of its model {model.name} is {_shown(expected)}"
 
 
 def _shown(value: object) -> str:
     text = ascii(value)
     return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+SOURCE_DATE_EPOCH = "SOURCE_DATE_EPOCH"
+"""Environment variable that states the time of `created`, so that a repeated run gives the same bytes
+(https://reproducible-builds.org/specs/source-date-epoch/)."""
+
+
+class Description:
+    """What a file that is being written says of its muons.
+
+    Parameters
+    ----------
+    path
+        The file, for errors.
+    attributes
+        What was given: see `deepmuon_runtime.muon_file.writer.MuonWriter`.
+
+    Raises
+    ------
+    RefusedError
+        If an attribute is missing or can't be what it is, or SOURCE_DATE_EPOCH is no time.
+    """
+
+    def __init__(self, path: str | Path, attributes: Mapping[str, object]) -> None:
+        missing = [name for name in ("depth_m", "medium") if name not in attributes]
+        if missing:
+            raise RefusedError(f"a muon file must say its {' and '.join(missing)}: add it to the attributes")
+        self._created = _stated_time()
+        self._attributes = {name: _storable(value) for name, value in attributes.items()}
+        for defect in _defects(self._attributes):
+            raise RefusedError(f"{path} was not written: {defect}")
+
+    def of(self, count: int) -> dict[str, Any]:
+        """Return all attributes of a file of so many muons that is complete now."""
+        attributes = {"created_by": f"deepmuon-runtime {version('deepmuon-runtime')}", **self._attributes}
+        attributes["count"] = count
+        attributes["created"] = (self._created or datetime.now(timezone.utc)).isoformat(timespec="seconds")
+        for live_time, rate in LIVE_TIMES.items():
+            if attributes.get(rate, 0) > 0:
+                attributes[live_time] = count / float(attributes[rate])
+        return attributes
+
+
+def _stated_time() -> datetime | None:
+    """Return the time that the environment states for all that is made, if it does.
+
+    Raises
+    ------
+    RefusedError
+        If it is none.
+    """
+    stated = os.environ.get(SOURCE_DATE_EPOCH)
+    if stated is None:
+        return None
+    try:
+        return datetime.fromtimestamp(int(stated), timezone.utc)
+    except (ValueError, OverflowError, OSError) as error:
+        raise RefusedError(
+            f"{SOURCE_DATE_EPOCH} is {stated!r}, and should be whole seconds since 1970 (unset it for the present time)"
+        ) from error
+
+
+def _storable(value: Any) -> Any:
+    """Return an attribute with what HDF5 can't hold in a text escaped: the byte 0, and what is no UTF-8."""
+    if isinstance(value, (list, tuple)):
+        return [_storable(item) for item in value]
+    if isinstance(value, str):
+        return value.replace("\0", r"\x00").encode("utf-8", "backslashreplace").decode()
+    return value
+
+
+def _defects(attributes: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what keeps attributes from being written: no reader would take them."""
+    attributes = {name: python_value(value) for name, value in attributes.items()}
+    try:
+        attributes_crc32(attributes)
+    except ValueError as error:
+        yield str(error)
+    yield from value_defects(attributes)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 from typing import Any
-from zlib import crc32
 
 import h5py
 import numpy as np
@@ -18,7 +17,7 @@ from deepmuon_runtime.memory_limit import is_limited
 from deepmuon_runtime.model.metadata import Model
 from deepmuon_runtime.model.released import list_models, read_released
 from deepmuon_runtime.muon_file.attributes import attribute_defects, checksum_defects, is_generated, sound_attributes
-from deepmuon_runtime.muon_file.checksum import unlike
+from deepmuon_runtime.muon_file.checksum import crc32, unlike
 from deepmuon_runtime.muon_file.columns import (
     columns_of,
     missing_columns,
@@ -28,13 +27,13 @@ from deepmuon_runtime.muon_file.columns import (
 )
 from deepmuon_runtime.muon_file.damage import READ_ERRORS, member
 from deepmuon_runtime.muon_file.format import CHECKSUM, COLUMNS, check_format, stated
-from deepmuon_runtime.muon_file.place_and_time import PlacesAndTimes
+from deepmuon_runtime.muon_file.place_and_time import PlacesAndTimes, cuts_of, target_of_file
 from deepmuon_runtime.muon_file.reader import opened_file
 from deepmuon_runtime.muon_file.virtual import VirtualColumn, opened_source
 from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
 from deepmuon_runtime.physical import POSITIVE_ENERGIES, describe, explain, find_unphysical
 
-__all__ = ["Report", "check_file"]
+__all__ = ["Report", "check_file", "examine_muons"]
 
 PIECE = 1 << 17  # muons read at once
 
@@ -78,6 +77,13 @@ class Report:
     def mean_cos_zenith(self) -> float:  # noqa: D102 - above
         return self.cos_zenith_sum / self.examined if self.examined else float("nan")
 
+    def describe(self, attributes: Mapping[str, Any]) -> None:
+        """Note what the file says of its muons, and what is wrong with that."""
+        self.attributes = sound_attributes(attributes)
+        if is_generated(attributes):
+            self.model = _released_model(self.attributes)
+        self.defects += attribute_defects(attributes, self.model)
+
     def add(self, muons: Muons) -> None:
         """Count muons."""
         self.examined += len(muons)
@@ -119,16 +125,13 @@ def _report(file: h5py.File, version: int, progress: Callable[[int], object]) ->
     attributes = _read_attributes(group, "/muons", report.defects)
     if attributes:
         report.defects += checksum_defects(attributes, version)
-    if is_generated(attributes):
-        report.model = _released_model(sound_attributes(attributes))
-    report.attributes = sound_attributes(attributes)
-    report.defects += attribute_defects(attributes, report.model)
+    report.describe(attributes)
     there = columns_of(group, version)
     missing = list(missing_columns(group, there, version))
     report.defects += (f"the column {name} is missing" for name in missing)
     columns = _sound_columns(there, report.attributes.get("count"), report.defects, progress)
     if not missing and columns.keys() == there.keys() and len({len(column) for column in columns.values()}) == 1:
-        _examine_muons(columns, report, progress)
+        examine_muons(_pieces(columns, report), report, progress)
     else:
         report.defects.append("the muons were not examined, because the columns are not sound")
     return report
@@ -229,12 +232,8 @@ class _Column:
         return len(self.stored)
 
 
-def _examine_muons(columns: dict[str, _Column], report: Report, progress: Callable[[int], object]) -> None:
-    """Read all muons and note, for each fault, the first that has it and how many have."""
-    model = report.model
-    energies = POSITIVE_ENERGIES if model is None else (model.energy_min_gev, model.energy_max_gev)
-    faults: dict[str, _Faulty] = {}
-    places_and_times = PlacesAndTimes(report.attributes.get("live_time_s"))
+def _pieces(columns: dict[str, _Column], report: Report) -> Iterator[dict[str, Any]]:
+    """Yield the columns of all muons piece by piece, and note what can't be read, or is not what was written."""
     total = len(columns["pdg_id"])
     for first in range(0, total, PIECE):
         span = slice(first, min(first + PIECE, total))
@@ -242,18 +241,47 @@ def _examine_muons(columns: dict[str, _Column], report: Report, progress: Callab
             values = {name: column.read(span) for name, column in columns.items()}
         except READ_ERRORS as error:
             report.defects.append(f"the muons from {first} on can't be read: {_reason(error)}")
-            break
+            return
+        yield values
+    report.defects += _checksum_defects(columns)
+
+
+def examine_muons(
+    pieces: Iterable[Mapping[str, Any]], report: Report, progress: Callable[[int], object], *, rounding: float = 0.0
+) -> None:
+    """Look at all muons and note, for each fault, the first that has it and how many have.
+
+    Parameters
+    ----------
+    pieces
+        The columns of the muons, optional ones included, piece by piece.
+    report
+        Which takes note; its `model` and `attributes` say what the muons can be.
+    progress
+        Called with the number of muons of each piece.
+    rounding
+        How far a file of this format may keep an energy from what it was, relative.
+    """
+    model = report.model
+    energies = POSITIVE_ENERGIES if model is None else (model.energy_min_gev, model.energy_max_gev)
+    if model is not None and rounding:
+        energies = energies[0] * (1 - rounding), energies[1] * (1 + rounding)
+    faults: dict[str, _Faulty] = {}
+    cuts = cuts_of(report.attributes)
+    places_and_times = PlacesAndTimes(report.attributes.get("live_time_s"), target_of_file(report.attributes))
+    first = 0
+    for values in pieces:
         muons = Muons(**{name: values[name] for name in COLUMNS})
         report.add(muons)
         unphysical = ((explain(fault, *energies), bad) for fault, bad in find_unphysical(muons, *energies).items())
-        for fault, bad in chain(unphysical, places_and_times.faults(values)):
+        outside = [("is outside the cuts", ~cuts.keeps(muons, rounding))] if cuts else []
+        for fault, bad in chain(unphysical, outside, places_and_times.faults(values)):
             if bad.any():
                 index = int(np.argmax(bad))
                 known = faults.setdefault(fault, _Faulty(first + index, describe(muons, index)))
                 known.count += int(np.count_nonzero(bad))
         progress(len(muons))
-    else:
-        report.defects += _checksum_defects(columns)
+        first += len(muons)
     report.defects += (f"muon {known.first} {fault} ({known.muon}){known.others}" for fault, known in faults.items())
 
 

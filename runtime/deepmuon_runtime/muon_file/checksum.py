@@ -11,9 +11,13 @@ import struct
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from typing import Any
-from zlib import crc32
 
-__all__ = ["attributes_crc32", "joined_crc32", "unlike"]
+try:
+    from isal.isal_zlib import crc32  # the extra `fast`: the same numbers in a quarter of the time
+except ImportError:
+    from zlib import crc32
+
+__all__ = ["attributes_crc32", "crc32", "joined_crc32", "unlike"]
 
 # Polynomials over the field of two elements are numbers here: the coefficient of x^k is bit 31 - k.
 POLYNOMIAL = 0xEDB88320  # without its x^32

@@ -10,21 +10,22 @@ from deepmuon_runtime.files.output import check_output
 
 __all__ = ["check_muon_output"]
 
-AS_TEXT = "deepmuon-csv {stem}.h5 -o {name}"
+BY_CONVERT = "deepmuon-convert {stem}.h5 {name}"
+AS_CSV = "deepmuon-convert {stem}.h5 {stem}.csv"
 BY_PYTHON = "read it in Python with deepmuon_runtime.read_muons, and write {name} from there"
 OTHER_FORMATS = {
-    ".csv": ("text", AS_TEXT),
-    ".txt": ("text", AS_TEXT),
-    ".dat": ("text", AS_TEXT),
-    ".gz": ("a compressed file", "compress that"),
+    ".csv": ("text", BY_CONVERT),
+    ".txt": ("text", AS_CSV),
+    ".dat": ("text", AS_CSV),
+    ".gz": ("a packed file", BY_CONVERT),
     ".zip": ("a compressed file", "compress that"),
-    ".root": ("ROOT", BY_PYTHON),
+    ".root": ("ROOT", BY_CONVERT),
     ".parquet": ("Parquet", BY_PYTHON),
     ".feather": ("Arrow", BY_PYTHON),
     ".npy": ("NumPy", BY_PYTHON),
     ".npz": ("NumPy", BY_PYTHON),
     ".json": ("JSON", BY_PYTHON),
-    ".mcpl": ("MCPL", BY_PYTHON),
+    ".mcpl": ("MCPL", BY_CONVERT),
     ".onnx": ("a model", "muons are no model"),
     ".png": ("a picture", "deepmuon-plot {stem}.h5 -o {name}"),
     ".pdf": ("a picture", "deepmuon-plot {stem}.h5 -o {name}"),
@@ -55,12 +56,14 @@ def check_muon_output(path: str | Path, overwrite: bool = False, inputs: Iterabl
     if str(path) == "-":
         raise RefusedError(
             "- is no name of a muon file, which can't go to stdout: give one, as in -o muons.h5, and then write it as "
-            "text by deepmuon-csv muons.h5 -o -"
+            "text by deepmuon-convert muons.h5 -"
         )
     ending = Path(name).suffix.lower()
     if ending in OTHER_FORMATS:
         form, way = OTHER_FORMATS[ending]
         stem = name[: -len(ending)]
+        if ending == ".gz":
+            stem = Path(stem).stem
         raise RefusedError(
             f"{path} would be HDF5 under a name of {form}: write {stem}.h5, and then {way.format(stem=stem, name=name)}"
         )

@@ -10,14 +10,13 @@ from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
 from typing import Any
-from zlib import crc32
 
 import h5py
 from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import RefusedError, reason
 from deepmuon_runtime.muon_file.attributes import ALWAYS, checksum_defects, value_defects
-from deepmuon_runtime.muon_file.checksum import unlike
+from deepmuon_runtime.muon_file.checksum import crc32, unlike
 from deepmuon_runtime.muon_file.columns import (
     columns_of,
     missing_columns,
@@ -28,9 +27,9 @@ from deepmuon_runtime.muon_file.columns import (
 from deepmuon_runtime.muon_file.damage import READ_ERRORS, member
 from deepmuon_runtime.muon_file.format import (
     ATTRIBUTES_CHECKSUM,
-    BYTES_PER_MUON,
     CHECKSUM,
     COLUMNS,
+    bytes_per_muon,
     check_format,
     stated,
 )
@@ -60,7 +59,7 @@ def read_muons(path: str | Path, first: int = 0, count: int | None = None) -> Mu
 
     Returns
     -------
-    Muons [count]
+    Muons [count], with places and times where the file has them.
 
     Raises
     ------
@@ -73,8 +72,9 @@ def read_muons(path: str | Path, first: int = 0, count: int | None = None) -> Mu
         end = total if count is None else first + count
         if not 0 <= first <= end <= total:
             raise RefusedError(f"{path} holds {total} muons: those from {first} to {end} can't be read")
-        check_memory((end - first) * BYTES_PER_MUON, f"{end - first:,} muons of {path}", "read them in parts")
-        columns = file.read(first, end)
+        size = (end - first) * bytes_per_muon(file.columns)
+        check_memory(size, f"{end - first:,} muons of {path}", "read them in parts")
+        columns = file.read(first, end, file.columns)
         if (first, end) == (0, total):
             for name, column in columns.items():
                 file.verify(name, crc32(column.data))
@@ -93,7 +93,7 @@ def read_pieces(path: str | Path, size: int) -> Iterator[Muons]:
 
     Yields
     ------
-    Muons [size], and fewer at the end.
+    Muons [size], and fewer at the end, with places and times where the file has them.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def read_pieces(path: str | Path, size: int) -> Iterator[Muons]:
         makes something of them should not let it be seen before the end.
     """
     with opened(path) as file:
-        for columns in file.pieces(size):
+        for columns in file.pieces(size, file.columns):
             yield Muons(**columns)
 
 

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from datetime import datetime, timezone
-from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
-from zlib import crc32
+from typing import NamedTuple
 
 import h5py
 import numpy as np
@@ -21,7 +18,7 @@ from deepmuon_runtime.errors import RefusedError, reason
 from deepmuon_runtime.files.early_flush import EarlyFlush
 from deepmuon_runtime.files.partial import PartialFile
 from deepmuon_runtime.files.quiet import QuietFile
-from deepmuon_runtime.muon_file.attributes import LIVE_TIMES, value_defects
+from deepmuon_runtime.muon_file.attributes import Description
 from deepmuon_runtime.muon_file.checksum import attributes_crc32, joined_crc32
 from deepmuon_runtime.muon_file.format import (
     ATTRIBUTES_CHECKSUM,
@@ -31,39 +28,15 @@ from deepmuon_runtime.muon_file.format import (
     FORMAT_VERSION,
     OPTIONAL_COLUMNS,
     bytes_per_muon,
-    python_value,
     stated,
 )
+from deepmuon_runtime.muon_file.growing_column import GrowingColumn
 from deepmuon_runtime.muon_file.output import check_muon_output
 from deepmuon_runtime.muon_file.reader import opened
 from deepmuon_runtime.muon_file.virtual import Source, VirtualColumn, create_virtual_column
 from deepmuon_runtime.muons import Muons
 
 __all__ = ["MuonWriter", "write_muons"]
-
-SOURCE_DATE_EPOCH = "SOURCE_DATE_EPOCH"
-"""Environment variable that states the time of `created`, so that a repeated run gives the same bytes
-(https://reproducible-builds.org/specs/source-date-epoch/)."""
-
-
-def _stated_time() -> datetime | None:
-    """Return the time that the environment states for all that is made, if it does.
-
-    Raises
-    ------
-    RefusedError
-        If it is none.
-    """
-    stated = os.environ.get(SOURCE_DATE_EPOCH)
-    if stated is None:
-        return None
-    try:
-        return datetime.fromtimestamp(int(stated), timezone.utc)
-    except (ValueError, OverflowError, OSError) as error:
-        raise RefusedError(
-            f"{SOURCE_DATE_EPOCH} is {stated!r}, and should be whole seconds since 1970 (unset it for the present time)"
-        ) from error
-
 
 LARGEST_CHUNK = 1 << 17  # muons of one HDF5 chunk: smaller ones cost time and memory, larger ones gain nothing
 SMALLEST_CHUNK = 1 << 10  # but a file of a few muons should not carry a large empty chunk
@@ -117,17 +90,12 @@ class MuonWriter:
         check_muon_output(path, overwrite)
         self._partial = PartialFile(path, overwrite)
         self.path = self._partial.target
-        missing = [name for name in ("depth_m", "medium") if name not in attributes]
-        if missing:
-            raise RefusedError(f"a muon file must say its {' and '.join(missing)}: add it to the attributes")
         self.count = 0
-        self._created = _stated_time()
-        self._attributes = {name: _storable(value) for name, value in attributes.items()}
-        for defect in _defects(self._attributes):
-            raise RefusedError(f"{path} was not written: {defect}")
+        self._description = Description(path, attributes)
         self._types = {**COLUMNS, **{name: OPTIONAL_COLUMNS[name] for name in OPTIONAL_COLUMNS if name in optional}}
-        self._columns: dict[str, h5py.Dataset] = {}
-        self._checksums = dict.fromkeys(self._types, 0)
+        self._growing: dict[str, GrowingColumn] = {}
+        self._columns: dict[str, h5py.Dataset] = {}  # complete ones, and their checksums
+        self._checksums: dict[str, int] = {}
 
     def __enter__(self) -> MuonWriter:
         """Create the temporary file."""
@@ -143,14 +111,14 @@ class MuonWriter:
         return self
 
     def append(self, muons: Muons) -> None:
-        """Write muons, to a file without optional columns, after those already written.
+        """Write muons, with the columns of the file, after those already written.
 
         Raises
         ------
         FailedError
             If they can't be written, for instance on a full disk.
         """
-        self.append_columns(vars(muons))
+        self.append_columns(muons.columns)
 
     def append_columns(self, columns: Mapping[str, ArrayLike]) -> None:
         """Write muons, as all columns of the file by their names, after those already written.
@@ -207,20 +175,15 @@ class MuonWriter:
         self._backing = QuietFile(str(self._partial.path))
         self._partial.hold(self._backing.fileno())
         self._flush = EarlyFlush(self._backing.fileno())
-        # Whole chunks go straight to the file: a cache would only copy them once more.
-        self._file = h5py.File(self._backing, "w", rdcc_nbytes=0)
+        self._file = h5py.File(self._backing, "w", rdcc_nbytes=0)  # nothing is read again
 
     def _append(self, columns: Mapping[str, ArrayLike]) -> None:
         length = len(np.asarray(columns["pdg_id"]))
-        if not self._columns:
+        if not self._growing:
             self._create_columns(length)
-        end = self.count + length
-        for name, column in self._columns.items():
-            values = np.ascontiguousarray(columns[name], self._types[name][0])
-            column.resize((end,))
-            column[self.count : end] = values
-            self._checksums[name] = crc32(values.data, self._checksums[name])
-        self.count = end
+        for name, column in self._growing.items():
+            column.append(columns[name])
+        self.count += length
         self._raise_fault()
         self._flush.wrote(length * bytes_per_muon(self._types))
 
@@ -228,7 +191,7 @@ class MuonWriter:
         chunk = min(max(first_length, SMALLEST_CHUNK), LARGEST_CHUNK)
         group = self._file.create_group("muons")
         for name, (dtype, _) in self._types.items():
-            self._columns[name] = group.create_dataset(name, shape=(0,), maxshape=(None,), chunks=(chunk,), dtype=dtype)
+            self._growing[name] = GrowingColumn(group, name, dtype, chunk)
 
     def _refer(self, paths: Iterable[str | Path], progress: Callable[[int], object]) -> None:
         parts = []
@@ -262,30 +225,24 @@ class MuonWriter:
 
     def _finish(self) -> None:
         """Write the attributes, and all that is in memory to the disk."""
-        if not self._columns:
+        if not self._columns and not self._growing:
             self._create_columns(0)
+        for name, growing in self._growing.items():
+            growing.finish()
+            self._columns[name], self._checksums[name] = growing.dataset, growing.checksum
         for name, column in self._columns.items():
             column.attrs["units"] = self._types[name][1]
             column.attrs[CHECKSUM] = np.uint32(self._checksums[name])
         self._file.attrs["format"] = FORMAT
         self._file.attrs["format_version"] = FORMAT_VERSION
         group = self._file["muons"]
-        for name, value in self._all_attributes().items():
+        for name, value in self._description.of(self.count).items():
             is_texts = isinstance(value, list) and all(isinstance(item, str) for item in value)
             group.attrs.create(name, value, dtype=h5py.string_dtype() if is_texts else None)
         group.attrs[ATTRIBUTES_CHECKSUM] = np.uint32(attributes_crc32(stated(group)))
         self._file.close()
         self._raise_fault()
         self._flush.finish()
-
-    def _all_attributes(self) -> dict[str, Any]:
-        attributes = {"created_by": f"deepmuon-runtime {version('deepmuon-runtime')}", **self._attributes}
-        attributes["count"] = self.count
-        attributes["created"] = (self._created or datetime.now(timezone.utc)).isoformat(timespec="seconds")
-        for live_time, rate in LIVE_TIMES.items():
-            if attributes.get(rate, 0) > 0:
-                attributes[live_time] = self.count / float(attributes[rate])
-        return attributes
 
     def _raise_fault(self) -> None:
         if self._backing.error is not None:
@@ -321,27 +278,8 @@ def write_muons(path: str | Path, muons: Muons, attributes: Mapping[str, object]
     RefusedError, FailedError
         As for `MuonWriter`.
     """
-    with MuonWriter(path, attributes, overwrite) as writer:
+    with MuonWriter(path, attributes, overwrite, optional=muons.columns.keys() - COLUMNS) as writer:
         writer.append(muons)
-
-
-def _storable(value: Any) -> Any:
-    """Return an attribute with what HDF5 can't hold in a text escaped: the byte 0, and what is no UTF-8."""
-    if isinstance(value, (list, tuple)):
-        return [_storable(item) for item in value]
-    if isinstance(value, str):
-        return value.replace("\0", r"\x00").encode("utf-8", "backslashreplace").decode()
-    return value
-
-
-def _defects(attributes: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what keeps attributes from being written: no reader would take them."""
-    attributes = {name: python_value(value) for name, value in attributes.items()}
-    try:
-        attributes_crc32(attributes)
-    except ValueError as error:
-        yield str(error)
-    yield from value_defects(attributes)
 
 
 class _Part(NamedTuple):

@@ -13,10 +13,11 @@ import dask.array
 from dask import delayed
 
 from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.generator import Generator, checked_numbers
+from deepmuon_runtime.generator import Generator
 from deepmuon_runtime.latents.philox import checked_seed, new_seed
 from deepmuon_runtime.muon_file.format import COLUMNS
 from deepmuon_runtime.muons import Muons
+from deepmuon_runtime.sampling.numbers import checked_numbers
 
 __all__ = ["CHUNK", "muon_arrays"]
 

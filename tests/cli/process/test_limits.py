@@ -34,7 +34,7 @@ def commands(muon_file: Path) -> list[tuple[str, list[str]]]:
     return [
         ("gen", ["--depth", "10", "-n", "300000", "--seed", "1", "--threads", "4", "-q", "-o", "output.h5"]),
         ("check", [str(muon_file)]),
-        ("csv", [str(muon_file), "-o", "output.csv"]),
+        ("convert", [str(muon_file), "output.csv"]),
         ("merge", [str(muon_file), "-q", "-o", "output.h5"]),
         ("plot", [str(muon_file), "-o", "output.png"]),
     ]
@@ -83,7 +83,7 @@ def memories(few: int) -> Iterator[int]:
     yield from np.random.default_rng(few).integers(60, 400, few * TIMES).tolist()
 
 
-@pytest.mark.parametrize("number", range(5), ids=["gen", "check", "csv", "merge", "plot"])
+@pytest.mark.parametrize("number", range(5), ids=["gen", "check", "convert", "merge", "plot"])
 def test_a_limit_of_the_memory_ends_a_command_in_one_line(tmp_path, muon_file, number):
     """4 sizes of each, between 60 and 400 MB, and one in which none can even load its libraries."""
     command, words = commands(muon_file)[number]

@@ -44,9 +44,9 @@ def test_the_other_commands_do_their_work_and_refuse_damaged_files(tmp_path, mod
     (tmp_path / "damaged.h5").write_bytes((tmp_path / "muons.h5").read_bytes()[:1000])
     assert on(system, tmp_path, "check", "muons.h5") == (0, "")
     assert on(system, tmp_path, "merge", "muons.h5", "-o", "merged.h5") == (0, "")
-    assert on(system, tmp_path, "csv", "muons.h5", "-o", "muons.csv") == (0, "")
+    assert on(system, tmp_path, "convert", "muons.h5", "muons.csv") == (0, "")
     assert on(system, tmp_path, "plot", "muons.h5", "-o", "muons.png") == (0, "")
-    for command in (("check", "damaged.h5"), ("csv", "damaged.h5", "-o", "damaged.csv")):
+    for command in (("check", "damaged.h5"), ("convert", "damaged.h5", "damaged.csv")):
         code, err = on(system, tmp_path, *command)
         assert (code, err.count("\n")) == (2, 1)
 

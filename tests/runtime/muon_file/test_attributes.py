@@ -27,6 +27,7 @@ MODEL = Model(
     rate_hz_per_m2=50.0,
     rate_uncertainty_hz_per_m2=0.1,
     rate_relative_uncertainty=None,
+    energy_latents=None,
     metadata={},
 )
 ALWAYS = {

@@ -1,11 +1,42 @@
 from __future__ import annotations
 
+import subprocess
+import sys
 from zlib import crc32
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from deepmuon_runtime import read_muons
+from deepmuon_runtime.muon_file import checksum
 from deepmuon_runtime.muon_file.checksum import joined_crc32
+
+WITHOUT_ISAL = """
+import sys
+sys.modules["isal"] = None
+from zlib import crc32
+from deepmuon_runtime import Generator
+from deepmuon_runtime.muon_file import checksum
+assert checksum.crc32 is crc32
+Generator.open(file=sys.argv[1]).write("muons.h5", 200_000, seed=1)
+"""
+
+
+def test_the_faster_checksum_is_the_same():
+    pytest.importorskip("isal", reason="the extra `fast` is not installed")
+
+    @given(st.binary(max_size=10_000), st.integers(0, 2**32 - 1))
+    def same(data, before):
+        assert checksum.crc32(data, before) == crc32(data, before)
+
+    assert checksum.crc32 is not crc32
+    same()
+
+
+def test_without_the_extra_fast_a_file_has_the_checksums_that_all_who_read_find(tmp_path, model_file):
+    subprocess.run([sys.executable, "-c", WITHOUT_ISAL, model_file], cwd=tmp_path, check=True)
+    assert len(read_muons(tmp_path / "muons.h5")) == 200_000
 
 
 @given(st.lists(st.binary(max_size=1000)))

@@ -155,12 +155,12 @@ def test_a_file_that_is_replaced_keeps_its_mode(tmp_path, mode):
 @pytest.mark.parametrize(
     ("name", "advice"),
     [
-        ("muons.csv", "write muons.h5, and then deepmuon-csv muons.h5 -o muons.csv"),
-        ("muons.CSV", "write muons.h5, and then deepmuon-csv muons.h5 -o muons.CSV"),
-        ("muons.root", "write muons.h5, and then read it in Python with deepmuon_runtime.read_muons"),
-        ("muons.parquet", "write muons.h5, and then read it in Python"),
-        ("muons.mcpl", "write muons.h5, and then read it in Python"),
-        ("muons.mcpl.gz", "write muons.mcpl.h5, and then compress that"),
+        ("muons.csv", "write muons.h5, and then deepmuon-convert muons.h5 muons.csv"),
+        ("muons.CSV", "write muons.h5, and then deepmuon-convert muons.h5 muons.CSV"),
+        ("muons.root", "write muons.h5, and then deepmuon-convert muons.h5 muons.root"),
+        ("muons.parquet", "write muons.h5, and then read it in Python with deepmuon_runtime.read_muons"),
+        ("muons.mcpl", "write muons.h5, and then deepmuon-convert muons.h5 muons.mcpl"),
+        ("muons.mcpl.gz", "write muons.h5, and then deepmuon-convert muons.h5 muons.mcpl.gz"),
         ("muons.png", "deepmuon-plot muons.h5 -o muons.png"),
     ],
 )
@@ -523,6 +523,20 @@ def test_the_checksum_of_a_column_is_that_of_its_bytes_however_they_came(tmp_pat
         for first in range(0, 5000, 1100):
             writer.append(muons[first : first + 1100])
     assert checksums(tmp_path / "muons.h5") == {name: crc32(getattr(muons, name).tobytes()) for name in COLUMNS}
+
+
+def test_only_the_last_chunk_of_a_file_is_not_full_however_the_muons_came(tmp_path):
+    """That one holds zeros after the muons, which nobody reads."""
+    muons = some_muons(9000)
+    with MuonWriter(tmp_path / "muons.h5", PLANE) as writer:
+        for first, end in ((0, 2500), (2500, 2501), (2501, 8000), (8000, 9000)):
+            writer.append(muons[first:end])
+    with h5py.File(tmp_path / "muons.h5") as file:
+        for column in file["muons"].values():
+            assert (column.chunks, column.id.get_num_chunks()) == ((2500,), 4)
+            mask, last = column.id.read_direct_chunk((7500,))
+            assert (mask, last[-1000 * column.dtype.itemsize :]) == (0, bytes(1000 * column.dtype.itemsize))
+    assert are_equal(read_muons(tmp_path / "muons.h5"), muons)
 
 
 def test_muons_of_another_type_or_order_in_memory_are_written_as_the_format_says(tmp_path):

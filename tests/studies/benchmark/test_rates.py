@@ -14,6 +14,7 @@ from deepmuon_runtime import Generator
 from studies.benchmark import by_hand, job
 
 REPOSITORY = Path(__file__).parents[3]
+START = {"python": sys.executable, "deepmuon-gen": f"{sys.executable} -m deepmuon_cli.gen"}
 
 DRIVER = """#!/bin/sh
 # Stands for a driver of another generator: COUNT SEED OUT
@@ -36,8 +37,14 @@ def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_all_contestants_run_and_are_in_the_table_and_beside_it(driver: Path, tmp_path: Path):
-    output = tmp_path / "benchmark"
-    done = run("-n", "1000", "--repetitions", "1", "--cry", driver, "--linear", "--output", output)
+    output, old = tmp_path / "benchmark", tmp_path / "old"
+    (old / "bin").mkdir(parents=True)
+    for name in ("deepmuon-gen", "python"):  # this release stands for that one
+        (old / "bin" / name).write_text(
+            f'#!/bin/sh\nPYTHONPATH="{os.environ.get("PYTHONPATH", "")}" exec {START[name]} "$@"\n'
+        )
+        (old / "bin" / name).chmod(0o755)
+    done = run("-n", "1000", "--repetitions", "1", "--cry", driver, "--linear", "--old", old, "--output", output)
     assert done.returncode == 0, done.stderr
     assert output.with_suffix(".md").read_text().startswith(done.stdout.removesuffix("\n"))
     report = json.loads(output.with_suffix(".json").read_text())
@@ -45,8 +52,11 @@ def test_all_contestants_run_and_are_in_the_table_and_beside_it(driver: Path, tm
     assert {"deepmuon-gen", "library, no file", "CRY", "limit: writing alone"} < set(rows)
     assert "EcoMug" not in rows
     assert (rows["CRY"]["muons"], rows["CRY"]["bytes_per_muon"]) == (40, 20)
+    assert {"sample() to memory", "0.1.0", "sample() to memory, 0.1.0"} < set(rows)
     for name, row in rows.items():
         assert f"| {name} |" in done.stdout
+        assert len(row["processor_seconds"]) == 1
+        assert row["processor_seconds"][0] > 0 or name == "CRY"
         assert row["muons_per_second"] * row["seconds"][0] == pytest.approx(row["muons"])
         assert row["peak_memory"] > 1e6
     assert [(line["kind"], line["muons"]) for line in report["linear"]] == [

@@ -13,6 +13,7 @@ from deepmuon_runtime import Generator
 from deepmuon_training.export.metadata import Training
 from deepmuon_training.generators.fitted import FittedGenerator
 from deepmuon_training.sample import write_sample
+from deepmuon_training.scores.evaluation import Evaluation
 
 COMMAND = Path(sysconfig.get_path("scripts")) / "deepmuon-train"
 
@@ -54,6 +55,12 @@ def test_generators_become_a_family_that_is_scored_between_them(folder):
     scored = run(folder, "evaluate", "family.onnx", "held_out.h5", "--depth", "2.5", *options)
     assert (scored.returncode, scored.stderr) == (0, "")
     assert "quantile, 2.5 m of water" in (folder / "report.html").read_text()
+    options = ["--surface", "sphere", "-n", "1.5e5", "-o", "sphere.html", "--json", "sphere.json", "-q"]
+    scored = run(folder, "evaluate", "family.onnx", "held_out.h5", "--depth", "2.5", *options)
+    assert (scored.returncode, scored.stderr) == (0, "")
+    found = Evaluation.from_json((folder / "sphere.json").read_text())
+    assert found.surface == 1
+    assert max(abs(tail.pull) for tail in found.tails) < 4.5  # its own training muons: alike, and more so
     wrong = run(folder, "evaluate", "family.onnx", "held_out.h5", "--depth", "3", "-o", "other.html")
     assert wrong.returncode == 2
     assert "compare muons of one place" in wrong.stderr

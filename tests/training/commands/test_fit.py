@@ -28,13 +28,6 @@ from studies.pictures.mountain import behind_mountain
 COMMAND = Path(sysconfig.get_path("scripts")) / "deepmuon-train"
 
 QUANTILE = """
-[zenith]
-adam = 20
-round = 5
-rounds = 1
-[charge]
-steps = 10
-validate_every = 2
 [azimuth]
 steps = 10
 """
@@ -47,8 +40,10 @@ steps = 4
 validate_every = 2
 [charge]
 steps = 4
+validate_every = 2
 """
 FIT = "fit sea_level.h5 -o generator.pt --settings quantile.toml"
+SLOW_FIT = "fit sea_level.h5 -o generator.pt --architecture transformer -d 16 --settings transformer.toml"
 
 
 @pytest.fixture(scope="module")
@@ -122,8 +117,8 @@ def test_an_unknown_rate_stays_unknown(run, sample):
 
 
 def test_ctrl_c_leaves_a_checkpoint_from_which_the_same_command_goes_on(run, monkeypatch):
-    run(FIT.replace("generator.pt", "undisturbed.pt"))
-    cross_entropy, calls = charge.binary_cross_entropy_with_logits, iter(range(7))
+    run(SLOW_FIT.replace("generator.pt", "undisturbed.pt"))
+    cross_entropy, calls = charge.binary_cross_entropy_with_logits, iter(range(4))
 
     def stopping(*arguments: torch.Tensor) -> torch.Tensor:
         if next(calls, None) is None:
@@ -133,10 +128,11 @@ def test_ctrl_c_leaves_a_checkpoint_from_which_the_same_command_goes_on(run, mon
     with monkeypatch.context() as patch:
         patch.setattr(charge, "binary_cross_entropy_with_logits", stopping)
         with pytest.raises((KeyboardInterrupt, click.Abort)):
-            run(FIT)
-    assert [path.name for path in Path("generator.pt.checkpoint").iterdir()] == ["charge.pt"]
+            run(SLOW_FIT)
+    kept = {path.name for path in Path("generator.pt.checkpoint").iterdir()}
+    assert kept == {"transformer.pt", "charge.pt"}
     assert not Path("generator.pt").exists()
-    run(FIT)
+    run(SLOW_FIT)
     assert digest("generator.pt") == digest("undisturbed.pt")
     assert not Path("generator.pt.checkpoint").exists()
 
@@ -164,15 +160,15 @@ def test_a_damaged_generator_is_not_exported(run):
 
 
 def test_a_damaged_checkpoint_is_not_gone_on_from(run, monkeypatch):
-    def stopping(*arguments: object) -> None:
+    def stopping(*arguments: object, **options: object) -> None:
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("deepmuon_training.generators.quantile.fit.regress", stopping)
+        patch.setattr("deepmuon_training.generators.transformer.architecture.radius_table", stopping)
         with pytest.raises((KeyboardInterrupt, click.Abort)):
-            run(FIT)
+            run(SLOW_FIT)
     flip("generator.pt.checkpoint/charge.pt", 5000)
-    done = subprocess.run([COMMAND, *shlex.split(FIT)], capture_output=True, text=True)
+    done = subprocess.run([COMMAND, *shlex.split(SLOW_FIT)], capture_output=True, text=True)
     assert done.returncode == 2
     assert re.fullmatch(r"deepmuon-train: generator.pt.checkpoint/charge.pt is damaged.*: remove it\n", done.stderr)
 
@@ -208,18 +204,18 @@ def test_a_source_that_was_cut_gives_a_model_that_is_cut_there(run, sample):
 
 
 def test_the_checkpoint_of_other_muons_is_refused(run, sample, monkeypatch):
-    def stopping(*arguments: object) -> None:
+    def stopping(*arguments: object, **options: object) -> None:
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("deepmuon_training.generators.quantile.fit.regress", stopping)
+        patch.setattr("deepmuon_training.generators.transformer.architecture.radius_table", stopping)
         with pytest.raises((KeyboardInterrupt, click.Abort)):
-            run(FIT + " --checkpoint kept")
+            run(SLOW_FIT + " --checkpoint kept")
     assert Path("kept").exists()
     write_sample("other.h5", replace(sample, muons=sample.muons[5000:10_000]))
-    with pytest.raises(RefusedError, match=r"kept/charge.pt is a checkpoint of other data"):
-        run("fit other.h5 -o generator.pt --settings quantile.toml --checkpoint kept")
-    run(FIT + " --checkpoint kept")
+    with pytest.raises(RefusedError, match=r"kept/transformer.pt is a checkpoint of other data"):
+        run(SLOW_FIT.replace("sea_level.h5", "other.h5") + " --checkpoint kept")
+    run(SLOW_FIT + " --checkpoint kept")
     assert not Path("kept").exists()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -116,6 +117,20 @@ def test_what_depends_on_the_depth_is_gone_once_the_file_is_loaded(file, family,
         assert not [node.name for node in nodes if node.name.startswith("depth/")]
         operators.append(Counter(node.op_type for node in nodes))
     assert operators[0] == operators[1]
+
+
+def test_a_muon_of_a_family_takes_as_long_as_one_of_what_is_baked_of_it(file, tmp_path):
+    """Tables that were made again for each block of muons would take twenty times as long, and not twice."""
+    (tmp_path / "baked.onnx").write_bytes(bake(file.read_bytes(), 3.3))
+    family = Generator.open(3.3, file=file, device="cpu", threads=1)
+    baked = Generator.open(file=tmp_path / "baked.onnx", device="cpu", threads=1)
+    times: dict[Generator, list[float]] = {family: [], baked: []}
+    for round_ in range(7):
+        for generator, taken in times.items():
+            begun = time.process_time()
+            generator.sample(200_000, seed=round_)
+            taken.append(time.process_time() - begun)
+    assert min(times[family]) < 2 * min(times[baked])
 
 
 def openvino_muons(contents: bytes) -> list[np.ndarray]:

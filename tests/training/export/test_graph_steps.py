@@ -18,6 +18,7 @@ from deepmuon_training.export.graph_steps import (
     columns,
     interpolation_cells,
     kinetic_energy,
+    look_up,
     matrix,
     on_plane,
     place,
@@ -56,8 +57,8 @@ def table_at(table: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Look up values of a table with one knot to a unit."""
     g = Graph()
     cell, inside = place(g, "x", 1.0)
-    row = g("Gather", interpolation_cells(g, table), g("Cast", cell, to=TensorProto.INT32))
-    start, slope = columns(g, row, 2)
+    index = g("Cast", cell, to=TensorProto.INT32)
+    start, slope = (look_up(g, part, index) for part in interpolation_cells(g, table))
     return run(g, g("Add", start, g("Mul", inside, slope)), ["n"], x=x)
 
 
@@ -73,29 +74,27 @@ def test_a_table_is_exact_at_its_knots():
 
 
 ROWS, COLUMNS = 6, 9
-TABLES = RANDOM.normal(size=(2, ROWS, COLUMNS)).astype(np.float32)
+TABLE = RANDOM.normal(size=(ROWS, COLUMNS)).astype(np.float32)
+BILINEAR = RegularGridInterpolator((np.arange(ROWS), np.arange(COLUMNS)), TABLE)
 PLACES = np.float32([ROWS - 1.001, COLUMNS - 1.001]) * RANDOM.random((1000, 2), dtype=np.float32)
 
 
-@pytest.mark.parametrize("which", [0, 1])
-def test_two_tables_share_their_cells_and_are_read_by_bilinear_interpolation(which):
+def test_a_table_of_two_dimensions_is_read_by_bilinear_interpolation():
     g = Graph()
     row, column = columns(g, "x", 2)
     (i, a), (j, b) = place(g, row, 1.0), place(g, column, 1.0)
     cell = g("Cast", g("Add", g("Mul", i, float(COLUMNS - 1)), j), to=TensorProto.INT32)
-    coefficients = columns(g, g("Gather", bilinear_cells(g, *TABLES), cell), 8)
-    found = run(g, on_plane(g, coefficients[4 * which : 4 * which + 4], a, b), ["n"], x=PLACES)
-    expected = RegularGridInterpolator((np.arange(ROWS), np.arange(COLUMNS)), TABLES[which])(PLACES)
-    np.testing.assert_allclose(found, expected, atol=1e-5)
+    coefficients = [look_up(g, part, cell) for part in bilinear_cells(g, TABLE)]
+    found = run(g, on_plane(g, coefficients, a, b), ["n"], x=PLACES)
+    np.testing.assert_allclose(found, BILINEAR(PLACES), atol=1e-5)
 
 
 @given(row=st.floats(0, ROWS - 1.001), column=st.floats(0, COLUMNS - 1.001))
 def test_the_evaluation_in_pytorch_is_bilinear_interpolation(row, column):
     i, j = int(row), int(column)
     arguments = torch.tensor(i), torch.tensor(row - i), torch.tensor(j), torch.tensor(column - j)
-    found = bilinear(torch.from_numpy(TABLES[0]), *arguments)
-    expected = RegularGridInterpolator((np.arange(ROWS), np.arange(COLUMNS)), TABLES[0])([[row, column]])[0]
-    assert float(found) == pytest.approx(expected, abs=1e-5)
+    found = bilinear(torch.from_numpy(TABLE), *arguments)
+    assert float(found) == pytest.approx(BILINEAR([[row, column]])[0], abs=1e-5)
 
 
 def test_the_place_of_a_negative_value_counts_from_the_knot_below():

@@ -83,6 +83,7 @@ def test_a_model_says_what_the_contract_asks_for(proto, exportable):
         "deepmuon.training_smoothed": "true",
         "deepmuon.training_muons": "100000",
         "deepmuon.training_seed": "1",
+        **({"deepmuon.energy_latents": "0 1"} if exportable.architecture == "quantile" else {}),
     }
 
 

@@ -10,8 +10,7 @@ from deepmuon_runtime import Generator
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_training.generators.fit import fit_generator
 from deepmuon_training.generators.fitted import FittedGenerator, export_fitted
-from deepmuon_training.generators.quantile.fit import QuantileSchedules
-from deepmuon_training.generators.quantile.regression import RegressionSteps
+from deepmuon_training.generators.quantile.fit import QuantileSettings
 from deepmuon_training.generators.transformer.fit import TransformerSettings
 from deepmuon_training.learning.descent import Schedule
 from deepmuon_training.learning.support import Stated
@@ -19,7 +18,7 @@ from deepmuon_training.sealed import seal
 
 CHARGE = Schedule(steps=10, learning_rate=0.02, averaging=0.5, validate_every=5)
 TINY = {
-    "quantile": QuantileSchedules(zenith=RegressionSteps(adam=20, round=5, rounds=1), charge=CHARGE),
+    "quantile": QuantileSettings(azimuth=CHARGE),
     "transformer": TransformerSettings(
         d=16, batch=512, directions=4, schedule=replace(CHARGE, learning_rate=1e-3), charge=CHARGE, calibration=100_000
     ),
@@ -75,7 +74,7 @@ def test_a_saved_generator_says_what_training_was(fitted, few, architecture, tmp
     assert (training.source, training.provenance) == (few.source, few.provenance)
     assert (training.rate, training.depth_m, training.medium) == (few.rate, few.depth_m, few.medium)
     assert (training.muons, training.seed) == (len(few), 3)
-    assert fitted.settings["charge"]["steps"] == 10
+    assert fitted.settings[{"quantile": "azimuth", "transformer": "charge"}[architecture]]["steps"] == 10
 
 
 def test_a_saved_generator_is_replaced_only_if_wanted(fitted, tmp_path):
@@ -105,8 +104,8 @@ def test_a_file_that_is_no_generator_is_refused(tmp_path, content, capsys):
 
 
 def test_a_generator_of_a_later_version_is_refused(tmp_path):
-    (tmp_path / "generator.pt").write_bytes(seal({"format": "deepmuon-generator", "format_version": 3}))
-    with pytest.raises(RefusedError, match="has format version 3, and this release reads version 2"):
+    (tmp_path / "generator.pt").write_bytes(seal({"format": "deepmuon-generator", "format_version": 4}))
+    with pytest.raises(RefusedError, match="has format version 4, and this release reads version 3"):
         FittedGenerator.load(tmp_path / "generator.pt")
 
 
@@ -227,7 +226,7 @@ def test_what_is_stated_is_kept_and_muons_beyond_it_are_refused(few):
     top, settings = float(few.muons.kinetic_energy.max()), TINY["quantile"]
     stated = Stated(energy_max=2 * top, zenith_max=89.9)
     fitted = fit_generator(few, "quantile", seed=1, settings=settings, stated=stated, progress=False)
-    assert fitted.networks.tails.energy_max == 2 * top
+    assert fitted.networks.energy_range[1] == 2 * top
     with pytest.raises(RefusedError, match=r"kinetic energy of .* GeV, outside of the 5 GeV that were stated; so"):
         fit_generator(few, "quantile", seed=1, stated=Stated(energy_max=5))
     with pytest.raises(RefusedError, match=r"has a zenith angle of .* degrees, outside of the 30 degrees"):

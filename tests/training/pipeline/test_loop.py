@@ -38,10 +38,6 @@ muons = 20_000
 muons_per_part = 8_000
 scored_muons = 100_000
 
-[quantile]
-charge = { steps = 6, averaging = 0.5, validate_every = 2 }
-zenith = { adam = 20, round = 5, rounds = 3 }
-
 [transformer]
 d = 16
 batch = 2048
@@ -117,7 +113,7 @@ def contents(run: Path) -> dict[str, object]:
             attributes = read_attributes(path)
             attributes = {name: attributes[name] for name in attributes.keys() - {"created", "command_line"}}
             muons = read_muons(path)
-            found[path.name] = attributes, {name: getattr(muons, name).tobytes() for name in vars(muons)}
+            found[path.name] = attributes, {name: getattr(muons, name).tobytes() for name in muons.columns}
         else:
             found[path.name] = path.read_bytes()
     return found
@@ -218,8 +214,7 @@ def test_a_run_with_a_damaged_file_is_refused_in_one_line_that_says_what_to_do(f
 
 KILLS: dict[str, dict[str, tuple[str, str, int, str]]] = {
     "quantile": {
-        "charge fit": ("torch.optim", "AdamW.step", 2, "unfinished-quantile-0m.pt/charge.pt"),
-        "zenith fit": ("torch.optim", "LBFGS.step", 2, "*"),
+        "fit": ("deepmuon_training.generators.quantile.fit", "fit_logit", 1, "*"),
         "export": ("deepmuon_training.export.onnx_export", "compare", 1, "quantile-0m.pt"),
         "draw": ("deepmuon_runtime.muon_file.writer", "MuonWriter.append", 1, "quantile-0m.onnx"),
         "transport": ("time", "sleep", 2, "unfinished-muons-1m.h5/part-00000.h5"),

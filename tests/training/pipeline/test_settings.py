@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from deepmuon_runtime.errors import RefusedError
-from deepmuon_training.generators.quantile.regression import RegressionSteps
 from deepmuon_training.learning.descent import Schedule
 from deepmuon_training.pipeline.settings import PipelineSettings, read_pipeline_settings
 from deepmuon_training.pipeline.settings_file import settings_from, to_toml
@@ -21,11 +20,10 @@ SCHEDULES = st.builds(Schedule, POSITIVE, FRACTION, FRACTION, FRACTION, POSITIVE
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), min_size=1)
 FITS = PipelineSettings().fits
 SETTINGS = st.builds(
-    lambda charge, zenith, kind, **values: PipelineSettings(
-        **values, **kind, fits={**FITS, "quantile": replace(FITS["quantile"], charge=charge, zenith=zenith)}
+    lambda azimuth, kind, **values: PipelineSettings(
+        **values, **kind, fits={**FITS, "quantile": replace(FITS["quantile"], azimuth=azimuth)}
     ),
     SCHEDULES,
-    st.builds(RegressionSteps, POSITIVE, POSITIVE, POSITIVE, POSITIVE),
     st.sampled_from([{"azimuth": "uniform"}, {"azimuth": "learned"}, {"architecture": "transformer"}]),
     layers=st.integers(0, 100),
     layer_m=st.floats(0, 1e4, exclude_min=True),
@@ -54,11 +52,11 @@ def read(tmp_path: Path):
 
 def test_what_is_not_stated_keeps_its_default(read):
     assert read("") == PipelineSettings()
-    found = read("layers = 2\nmuons = 1e6\n[quantile]\ncharge = {steps = 7}\n[transformer.schedule]\npatience = 3")
+    found = read("layers = 2\nmuons = 1e6\n[quantile]\nazimuth = {steps = 7}\n[transformer.schedule]\npatience = 3")
     assert (found.layers, found.muons, type(found.muons)) == (2, 1_000_000, int)
-    assert found.fits["quantile"].charge == replace(FITS["quantile"].charge, steps=7)
+    assert found.fits["quantile"].azimuth == replace(FITS["quantile"].azimuth, steps=7)
     assert found.fits["transformer"].schedule == replace(FITS["transformer"].schedule, patience=3)
-    assert (found.layer_m, found.fits["quantile"].zenith) == (10.0, FITS["quantile"].zenith)
+    assert (found.layer_m, found.fits["transformer"].charge) == (10.0, FITS["transformer"].charge)
 
 
 def test_the_fit_is_that_of_the_architecture(read):
@@ -71,7 +69,7 @@ def test_the_fit_is_that_of_the_architecture(read):
     [
         ("layer_depth = 3", "unknown key 'layer_depth'; the nearest known one is 'layer_m'"),
         ("seeds = 3", "unknown key 'seeds'; the nearest known one is 'seed'"),
-        ("[quantile.zenit]\nadam = 3", "quantile: unknown key 'zenit'; the nearest known one is 'zenith'"),
+        ("[quantile.azimut]\nsteps = 3", "quantile: unknown key 'azimut'; the nearest known one is 'azimuth'"),
         ('"two\\nlines" = 1', "unknown key 'two\\nlines'; the nearest known one is '"),
         ("muons = 1234.5", "muons is 1234.5, and should be a whole number"),
         ("muons = inf", "muons is inf, and should be a whole number"),
@@ -86,9 +84,8 @@ def test_the_fit_is_that_of_the_architecture(read):
         ('material = "G4_WATR"', "Geant4 knows no material G4_WATR: there are for instance G4_WATER"),
         ("density = 100", "density is 100.0, and should be from 1e-06 to 30"),
         ('architecture = "transformer"\nazimuth = "learned"', "a transformer always learns it, leave it out"),
-        ("[quantile.zenith]\nadam = -1", "quantile: zenith: adam is -1, and should be from 0"),
-        ("[quantile.zenith]\nround = -5", "quantile: zenith: round is -5, and should be from 1"),
-        ("[quantile.charge]\nlearning_rate = -1e-3", "charge: learning_rate is -0.001, and should be above 0"),
+        ("[quantile.azimuth]\nsteps = -5", "quantile: azimuth: steps is -5, and should be from 1"),
+        ("[transformer.charge]\nlearning_rate = -1e-3", "charge: learning_rate is -0.001, and should be above 0"),
         ("[transformer.schedule]\naveraging = 1", "schedule: averaging is 1.0, and should be at least 0 and below 1"),
         ("[transformer]\ncalibration = 0", "transformer: calibration is 0, and should be from 1,000"),
         ("[transformer]\ndirections = 0", "transformer: directions is 0, and should be from 1"),
@@ -132,5 +129,5 @@ def test_every_number_of_all_settings_has_a_range():
         hints = get_type_hints(kind, include_extras=True)
         return [name for name, hint in hints.items() if hint in (int, float, float | None)]
 
-    for kind in (PipelineSettings, Schedule, *map(type, FITS.values()), RegressionSteps):
+    for kind in (PipelineSettings, Schedule, *map(type, FITS.values())):
         assert unlimited(kind) == []

@@ -5,14 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from deepmuon_runtime import Generator
 from deepmuon_training.export.family_export import export_family
 from deepmuon_training.export.metadata import Training
 from deepmuon_training.families.rates import KnownRate
 from deepmuon_training.generators.quantile.family import quantile_family
 from deepmuon_training.release.card import GENERAL_LIMITS, manifest_entry
 from deepmuon_training.release.family_card import family_card
-from deepmuon_training.scores.evaluate import evaluate
+from deepmuon_training.scores.model_evaluation import evaluate_model
 
 
 @pytest.fixture(scope="module")
@@ -33,8 +32,9 @@ def file(quantile_tables, knots, tmp_path_factory) -> Path:
 def text(file, knots, sample) -> str:
     evaluations = {}
     for depth in 1.0, 0.0:
-        generated = Generator.open(file=file, depth=depth, device="cpu", threads=1).sample(100_000, seed=1)
-        evaluations[depth] = evaluate(generated, sample.muons, seed=1)
+        held_out = replace(sample, depth_m=depth)
+        for surface, muons in ((1, 150_000), (0, 100_000)):
+            evaluations[depth, surface] = evaluate_model(file, held_out, muons, seed=1, depth=depth, surface=surface)
     return family_card(file, knots, evaluations, command="python make_family.py", notes=["Dense near the surface."])
 
 
@@ -50,6 +50,15 @@ def test_a_familys_card_says_its_range_knots_and_muons(text, knots, file):
 def test_its_scores_are_in_the_order_of_depth_and_say_which_are_of_knots(text):
     rows = [line for line in text.splitlines() if "| 100,000 | 100,000 |" in line]
     assert [row.split("|")[1:3] for row in rows] == [[" 0 ", " knot "], [" 1 ", " between "]]
+
+
+def test_its_muons_through_a_sphere_have_scores_of_their_own(text):
+    plane, sphere = text.split("Muons through a sphere")
+    assert plane.count("| between |") == sphere.count("| between |") == 1
+    row = next(line for line in sphere.splitlines() if line.startswith("| 0 | knot |"))
+    found, rate = int(row.split("|")[3].replace(",", "")), float(row.split("|")[-2])
+    assert 100_000 < found < 120_000  # the mean of cos zenith is 0.75
+    assert abs(rate - 1) < 0.01
 
 
 def test_it_ends_with_its_limits(text):

@@ -99,7 +99,7 @@ def command(input_file: Path, output: Path, form: str, overwrite: bool, quiet: b
         cry-hdf5  /muons/{kinetic_energy, u, v, w, charge}, MeV, and the attributes
                   rate_hz_per_m2 and source
         csv       numbers with commas, semicolons, tabs or blanks between them; what
-                  deepmuon-csv wrote
+                  deepmuon-convert wrote
         npy       floating-point numbers of NumPy, one row for each muon
         mcpl      MCPL; needs pip install 'deepmuon-training[mcpl]'
         root      a tree of ROOT, muons.root or muons.root:tree; its columns are its

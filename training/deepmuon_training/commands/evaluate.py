@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from deepmuon_cli.bake import SURFACES
 from deepmuon_cli.options.quantities import muon_number, number_from_zero, positive_number, seed_number
 
 __all__ = ["command"]
@@ -29,6 +30,11 @@ TIMES_HELD_OUT = 10  # more than these would no longer lessen the noise
     help="Muons to generate; if left out ten times the held-out ones, but at most 2e7.",
 )
 @click.option("--depth", type=number_from_zero, metavar="METRES", help="Of a family: where it is scored.")
+@click.option(
+    "--surface",
+    type=click.Choice(list(SURFACES)),
+    help="Of a family: its muons through a horizontal plane, as they are if left out, or through a sphere.",
+)
 @click.option("--seed", type=seed_number, default="1", show_default=True, help="Of the generated muons.")
 @click.option(
     "--variance-factor",
@@ -45,6 +51,7 @@ def command(
     json_output: Path | None,
     number: int | None,
     depth: float | None,
+    surface: str | None,
     seed: int,
     variance_factor: float | None,
     overwrite: bool,
@@ -62,7 +69,8 @@ def command(
     MODEL is any ONNX file that keeps the project's contract. The report is one HTML file with tables and pictures,
     which needs no network. Each score stands beside what two alike samples of these sizes show. 100,000 muons are
     the fewest, of either; only more of them show small errors: a target that their noise hides is neither met nor
-    missed. Both have to be from one depth, in one medium; of a family, --depth says which.
+    missed. Both have to be from one depth, in one medium; of a family, --depth says which. Muons through a sphere are
+    scored by those of them that a horizontal plane has, one in 1/cos zenith.
 
     Muons that come in showers are not independent: their counts vary by more than their square root. --variance-factor
     says by how much; of CRY's spectra it is 1.17 at most.
@@ -93,7 +101,14 @@ def command(
                 bar.set_description("drawn, scoring takes a minute or two", refresh=sys.stderr.isatty())
 
         evaluation = evaluate_model(
-            model, truth, number, seed=seed, variance_factor=variance_factor, depth=depth, progress=drawn
+            model,
+            truth,
+            number,
+            seed=seed,
+            variance_factor=variance_factor,
+            depth=depth,
+            surface=None if surface is None else SURFACES[surface],
+            progress=drawn,
         )
     write_whole(output, html_report(evaluation, facts, truth, str(held_out)).encode(), overwrite=overwrite)
     if json_output is not None:

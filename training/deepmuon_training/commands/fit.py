@@ -34,7 +34,7 @@ FILE = click.Path(path_type=Path)
 @click.option("--energy-min", type=positive_number, metavar="GEV", help="No muon has less; if left out, see below.")
 @click.option("--energy-max", type=positive_number, metavar="GEV", help="No muon has more.")
 @click.option("--zenith-max", type=positive_number, metavar="DEGREES", help="No muon is flatter.")
-@click.option("--seed", type=seed_number, default="1", show_default=True, help="Of weights and batches.")
+@click.option("--seed", type=seed_number, default="1", show_default=True, help="Of what is random.")
 @click.option("--settings", type=FILE, metavar="FILE", help="How long to train, in TOML; as for the released models.")
 @click.option(
     "--checkpoint",
@@ -62,15 +62,17 @@ def command(
     """Train a generator on a muon file.
 
     \b
-        $ deepmuon-train fit sea_level.h5 --settings try.toml -o generator.pt
+        $ deepmuon-train fit sea_level.h5 -o generator.pt
         generator.pt: quantile, fitted to 300,000 muons, seed 1
         next: deepmuon-train export generator.pt -o model.onnx
 
-    Ctrl-C leaves a checkpoint, at most half a minute old, and the same command goes on from it to the same generator. A
-    checkpoint of other muons, another seed or other settings is refused.
+    A quantile generator takes less than a minute. Of a network, such as a transformer is, Ctrl-C leaves a checkpoint,
+    at most half a minute old, and the same command goes on from it to the same generator; a checkpoint of other muons,
+    another seed or other settings is refused. The last twentieth of the muons, 500,000 at most, decides when a network
+    stops to learn.
 
-    The last twentieth of the muons, 500,000 at most, decides when to stop. 3,000 muons are the fewest; a good generator
-    takes a million. They need to be independent, and in no particular order.
+    3,000 muons are the fewest; a good generator takes a million. They need to be independent, and in no particular
+    order.
 
     --azimuth uniform is accepted where harmonics 1 to 4 of the muons' azimuth are zero within noise, below 1 GeV, from
     1 to 10 GeV and above; one in ten thousand uniform samples is refused by chance. Few muons prove little: 100,000
@@ -80,17 +82,16 @@ def command(
     stay of one charge. A sharp cut is found in the muons. State one that is not, as where few muons are near it:
     --energy-max 1000. A muon beyond what is stated is refused.
 
-    A file of settings has any of these keys, here with the values that they have if left out; try.toml, just to see
-    it work, asks for zenith.adam = 200, zenith.round = 50, zenith.rounds = 2 and charge.steps = 200:
+    A file of settings has any of these keys, here with the values that they have if left out:
 
     \b
-        quantile:                         transformer:
-        zenith.adam = 1500                batch = 32768
-        zenith.round = 500                directions = 32
-        zenith.rounds = 12                schedule.steps = 6000
-        zenith.patience = 3               schedule.learning_rate = 1e-3
-        charge.steps = 3000               charge.steps = 3000
-        azimuth.steps = 4000              calibration = 4e6
+        quantile, --azimuth learned:      transformer:
+        azimuth.steps = 4000              batch = 32768
+        azimuth.learning_rate = 0.01      directions = 32
+                                          schedule.steps = 6000
+                                          schedule.learning_rate = 1e-3
+                                          charge.steps = 3000
+                                          calibration = 4e6
     """  # noqa: D301 - click looks for the character \b
     from deepmuon_runtime.files.output import check_output
 

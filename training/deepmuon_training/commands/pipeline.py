@@ -60,8 +60,8 @@ def command(settings: Path, sample: Path, work: Path, held_out: tuple[Path, ...]
         family = false                in the end one model of all depths, also between the layers
         seed = 1                      from which all seeds are derived
 
-    and tables for the fit: [quantile.zenith], [quantile.charge], [transformer], [transformer.schedule], ..., with the
-    keys that deepmuon-train fit --help shows. An unknown key is an error.
+    and tables for the fit: [quantile.azimuth], [transformer], [transformer.schedule], ..., with the keys
+    that deepmuon-train fit --help shows. An unknown key is an error.
 
     A run that was killed goes on by the same command: finished steps are not done again, a fit goes on from its last
     checkpoint, a transport from its last part. It ends with the same muons and models as an undisturbed run. FOLDER

@@ -15,7 +15,7 @@ NAME = "deepmuon-train"
 
 _COMMANDS = {
     "convert": "Turn muons of another program into a muon file.",
-    "source": "Make sea-level muons from a parametric flux.",
+    "source": "Make muons from a parametric flux, at sea level or at any depth.",
     "transport": "Carry muons through water or another material by Geant4.",
     "fit": "Train a generator on a muon file.",
     "export": "Write a trained generator as an ONNX file.",

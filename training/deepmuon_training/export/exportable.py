@@ -27,6 +27,10 @@ class Exportable(Protocol):
         """Uniform numbers of a draw."""
 
     @property
+    def energy_latents(self) -> tuple[int, int] | None:
+        """Coarse and fine latent with which alone the energy rises, as the contract says; None where there are none."""
+
+    @property
     def muons_per_draw(self) -> int:
         """Muons made of them."""
 
@@ -55,6 +59,10 @@ class Family(Protocol):
     @property
     def latent_size(self) -> int:
         """Uniform numbers of a draw."""
+
+    @property
+    def energy_latents(self) -> tuple[int, int] | None:
+        """Coarse and fine latent with which alone the energy rises, as the contract says; None where there are none."""
 
     @property
     def muons_per_draw(self) -> int:

@@ -34,10 +34,12 @@ LARGEST_LATENT = 1 - 2**-24
 END = 2**31 - 1
 """Where a part of a table ends that goes on to the table's end."""
 
+_FLAT = np.array([-1], dtype=np.int64)
+
 
 def columns(g: Graph, matrix: str, count: int) -> list[str]:
     """Return the columns of an [n, count] matrix, each [n]; one-dimensional throughout, which runtimes do fastest."""
-    flat = g("Reshape", g("Transpose", matrix, perm=[1, 0]), np.array([-1], dtype=np.int64))
+    flat = g("Reshape", g("Transpose", matrix, perm=[1, 0]), _FLAT)
     return g.several("Split", count, flat, axis=0, num_outputs=count)
 
 
@@ -51,7 +53,8 @@ def look_up(g: Graph, table: str, index: str) -> str:
     """Return the numbers [n] of a table [m] at int32 indices [n], which may count from its end as -1, -2, ...
 
     Of data and indices of one dimension, GatherElements and Gather are the same operation. Processors do the first
-    some ten times as fast, CUDA the second; a runtime may take the one for the other wherever a node is named so.
+    some ten times as fast, CUDA the second; a runtime may take the one for the other wherever a node's name has
+    `/look_up/` in it, as it has within a scope.
     """
     with g.scope("look_up"):
         return g("GatherElements", table, index, axis=0)
@@ -73,32 +76,28 @@ def place(g: Graph, value: str, scale: float) -> tuple[str, str]:
     return floor, g("Sub", position, floor)
 
 
-def interpolation_cells(g: Graph, table: NDArray[np.float32]) -> str:
-    """Return a row (start, slope) for each cell between a table's knots [knots - 1, 2].
+def interpolation_cells(g: Graph, table: NDArray[np.float32]) -> list[str]:
+    """Return the start and the slope of each cell between a table's knots, each [knots - 1].
 
-    A muon then reads one row instead of two numbers: reading is what costs time. Runtimes make the rows
-    when they load the graph; the file holds the plain table.
+    Runtimes make them when they load the graph; the file holds the plain table.
     """
     name = g.constant(table.reshape(-1, 1))
     start = cut(g, name, 0, 0, -1)
-    return g("Concat", start, g("Sub", cut(g, name, 0, 1, END), start), axis=1)
+    return [g("Reshape", part, _FLAT) for part in (start, g("Sub", cut(g, name, 0, 1, END), start))]
 
 
-def bilinear_cells(g: Graph, *tables: NDArray[np.float32]) -> str:
-    """Return each cell's row of (value, along columns, along rows, mixed), for each table, [cells, 4 tables].
+def bilinear_cells(g: Graph, table: NDArray[np.float32]) -> list[str]:
+    """Return value, slope along columns, slope along rows and mixed term of each cell, each [cells].
 
     Further dimensions of a table are indices of its cells.
     """
-    parts = []
-    for table in tables:
-        name = g.constant(table)
-        corner = cut(g, name, 1, 0, -1)
-        along = g("Sub", cut(g, name, 1, 1, END), corner)
-        starts = [cut(g, part, 0, 0, -1) for part in (corner, along)]
-        ends = [cut(g, part, 0, 1, END) for part in (corner, along)]
-        parts += [*starts, *(g("Sub", end, start) for start, end in zip(starts, ends, strict=True))]
-    column = np.array([-1, 1], dtype=np.int64)
-    return g("Concat", *(g("Reshape", part, column) for part in parts), axis=1)
+    name = g.constant(table)
+    corner = cut(g, name, 1, 0, -1)
+    along = g("Sub", cut(g, name, 1, 1, END), corner)
+    starts = [cut(g, part, 0, 0, -1) for part in (corner, along)]
+    ends = [cut(g, part, 0, 1, END) for part in (corner, along)]
+    slopes = [g("Sub", end, start) for start, end in zip(starts, ends, strict=True)]
+    return [g("Reshape", part, _FLAT) for part in (*starts, *slopes)]
 
 
 def on_plane(g: Graph, coefficients: list[str], a: str, b: str) -> str:

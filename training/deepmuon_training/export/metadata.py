@@ -108,6 +108,7 @@ def _texts(
         "surface": 0,  # a horizontal plane
         "muons_per_draw": generator.muons_per_draw,
         "latent_size": generator.latent_size,
+        "energy_latents": None if generator.energy_latents is None else "{} {}".format(*generator.energy_latents),
         "energy_min_gev": generator.energy_range[0],  # all digits: a muon that the graph clips is within
         "energy_max_gev": generator.energy_range[1],
         "zenith_max_deg": None if training.zenith_max_deg is None else f"{training.zenith_max_deg:.6g}",

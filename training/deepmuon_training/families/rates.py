@@ -40,9 +40,9 @@ class Rates:
 
     Parameters
     ----------
-    depths
+    depths : [n]
         In metres, ascending; two or more.
-    rates : [surfaces, depths]
+    rates : [surfaces, n]
         Muons per second and m2.
     density
         Of the overburden in g/cm3.

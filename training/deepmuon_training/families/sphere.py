@@ -4,9 +4,8 @@ A horizontal plane sees J cos zenith, a sphere sees J from everywhere: its muons
 cos zenith, and its rate, per m2 of projected area, is the plane's times the mean of 1 / cos zenith. The map of the
 new density is the old one at other levels, found by integrals of the old map itself, in double precision.
 
-Near the horizon 1 / cos zenith would make much of what a map was never taught. With cos zenith going as a power a of
-its level, J goes as cos zenith^(1/a - 2). Below cos zenith 0.05 (87 degrees), where the atmosphere's curvature has
-ended what rises towards the horizon elsewhere, J is not let rise: a is 1/2 at most.
+Near the horizon 1 / cos zenith asks for what few muons have shown. There the map is a power of its level, as it was
+fitted: with cos zenith going as the power a, the flux J from a direction goes as cos zenith^(1/a - 2).
 """
 
 from __future__ import annotations
@@ -15,18 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 from scipy.special import expit
 
 __all__ = ["TriangularMap", "through_sphere"]
 
 _FINE = 32
 """Steps of the integral over the zenith, to a column."""
-
-_HORIZON = np.log(0.05 / 0.95)
-"""Logit of cos zenith under which J does not rise towards the horizon."""
-
-_STEEPEST = 0.5
-"""Largest slope there of logit cos zenith over the logit of its level."""
 
 _BEYOND = 40.0
 """Logit of the level to which the zenith's map is continued: where 1 / cos zenith grows, its far end counts."""
@@ -69,16 +63,15 @@ class TriangularMap:
 def through_sphere(plane: TriangularMap) -> tuple[Float64, Float64, Float64, float]:
     """Return energy [n], zenith and charge [r, c] of the sphere's map, and the mean of 1 / cos zenith."""
     rows = np.arange(len(plane.row_t))
-    known = np.array([_tamed(plane.column, zenith) for zenith in plane.zenith])
-    means = np.array([_Levels.of(plane, zenith).mean for zenith in known])
+    means = np.array([_Levels.of(plane, zenith).mean for zenith in plane.zenith])
     levels, mean = _weighted(plane.t, np.interp(plane.row, rows, means))
     energy = np.interp(np.interp(plane.t, levels, plane.t), plane.t, plane.energy)
     place = np.interp(np.interp(plane.row_t, levels, plane.t), plane.t, plane.row)
     zenith, charge = np.empty_like(plane.zenith), np.empty_like(plane.charge)
     for number, at in enumerate(place):
-        row = _between(known, at)
+        row = _between(plane.zenith, at)
         old = _Levels.of(plane, row).old_of(plane.column)
-        zenith[number] = np.interp(old, *_continued(plane.column, row))
+        zenith[number] = _curve(plane.column, row)(old)
         charge[number] = np.interp(old, plane.column, _between(plane.charge, at))
     return energy, zenith, charge, mean
 
@@ -88,15 +81,6 @@ def _between(table: Float64, place: float) -> Float64:
     low = min(int(place), len(table) - 2)
     between: Float64 = table[low] + (place - low) * (table[low + 1] - table[low])
     return between
-
-
-def _tamed(column: Float64, zenith: Float64) -> Float64:
-    """Return a row in which J does not rise towards the horizon."""
-    steps = np.diff(zenith)
-    near = zenith[1:] < _HORIZON
-    steps[near] = np.minimum(steps[near], _STEEPEST * np.diff(column)[near])
-    tamed: Float64 = zenith[-1] - np.append(np.cumsum(steps[::-1])[::-1], 0)
-    return tamed
 
 
 @dataclass(frozen=True)
@@ -109,10 +93,9 @@ class _Levels:
 
     @classmethod
     def of(cls, plane: TriangularMap, zenith: Float64) -> _Levels:
-        column, logit = _continued(plane.column, zenith)
         step = (plane.column[1] - plane.column[0]) / _FINE
         before = np.linspace(-_BEYOND, _BEYOND, 2 * int(_BEYOND / step) + 1)
-        cosine = np.maximum(expit(np.interp(before, column, logit)), plane.least_cosine)
+        cosine = np.maximum(expit(_curve(plane.column, zenith)(before)), plane.least_cosine)
         return cls(before, *_weighted(before, 1 / cosine))
 
     def old_of(self, logits: Float64) -> Float64:
@@ -120,12 +103,12 @@ class _Levels:
         return np.interp(logits, self.after, self.before)
 
 
-def _continued(column: Float64, zenith: Float64) -> tuple[Float64, Float64]:
-    """Continue a row to both sides in a straight line: cos zenith is a power of the level there."""
+def _curve(column: Float64, zenith: Float64) -> CubicHermiteSpline:
+    """Return a row as muons have it, a cubic through four columns; beyond, cos zenith is a power of the level."""
+    slope = np.gradient(zenith, column)
     low, high = -_BEYOND - column[0], _BEYOND - column[-1]
-    slope = np.diff(zenith) / np.diff(column)
-    ends = zenith[0] + low * min(slope[0], _STEEPEST), zenith[-1] + high * slope[-1]
-    return np.array([-_BEYOND, *column, _BEYOND]), np.array([ends[0], *zenith, ends[1]])
+    ends = zenith[0] + low * slope[0], zenith[-1] + high * slope[-1]
+    return CubicHermiteSpline([-_BEYOND, *column, _BEYOND], [ends[0], *zenith, ends[1]], [slope[0], *slope, slope[-1]])
 
 
 def _weighted(logit: Float64, weight: Float64) -> tuple[Float64, float]:

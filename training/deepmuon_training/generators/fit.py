@@ -35,7 +35,7 @@ def fit_generator(
     checkpoint_folder: Path | None = None,
     progress: bool = True,
 ) -> FittedGenerator:
-    """Fit a generator to a sample, the last twentieth of which (500,000 muons at most) validates.
+    """Fit a generator to a sample; the last twentieth (500,000 muons at most) validates what a network learns of it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A trained generator, before it is an ONNX file: its networks, and what they were trained on."""
+"""A trained generator, before it is an ONNX file: what was learned, and of which muons."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from deepmuon_training.sealed import read_sealed, seal
 
 __all__ = ["Exported", "FittedGenerator", "export_fitted"]
 
-_FORMAT, _FORMAT_VERSION = "deepmuon-generator", 2
+_FORMAT, _FORMAT_VERSION = "deepmuon-generator", 3
 
 
 @dataclass(frozen=True)
 class FittedGenerator:
-    """Networks with their preprocessing, and what training was.
+    """What was learned, with its preprocessing, and what training was.
 
     Parameters
     ----------

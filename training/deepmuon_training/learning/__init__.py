@@ -1,4 +1,4 @@
-"""What every network needs to learn: monotone maps, the descent and its checkpoints, validation, tails, charge.
+"""What every fit needs: smooth densities, the descent and its checkpoints, validation, ends of a sample, charge.
 
-Muons and networks in, trained networks out. Knows of no architecture.
+Muons in, what was learned of them out. Knows of no architecture.
 """

@@ -18,7 +18,7 @@ from deepmuon_training.energy_transform import EnergyTransform
 from deepmuon_training.learning.checkpoint import fingerprint
 from deepmuon_training.learning.condition import EnergyCondition
 from deepmuon_training.learning.descent import Schedule, fit
-from deepmuon_training.learning.monotone import perceptron
+from deepmuon_training.learning.perceptron import perceptron
 from deepmuon_training.learning.validation import split
 
 __all__ = ["CHARGE_SCHEDULE", "ChargeProbability", "fit_charge"]

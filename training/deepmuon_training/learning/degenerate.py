@@ -7,7 +7,7 @@ from scipy.special import logit
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import Muons
-from deepmuon_training.learning.power_law import outermost
+from deepmuon_training.learning.support import outermost
 from deepmuon_training.scores.independence import count_repeated
 
 __all__ = ["check_repeats", "check_ties"]
@@ -35,9 +35,9 @@ def check_repeats(muons: Muons) -> None:
 def check_ties(muons: Muons) -> None:
     """Refuse a sample with so many muons of one kinetic energy that its spectrum has a hole beside it.
 
-    A quantile function is flat where energies are tied. A tie may be as wide as 0.1 in the logit of the level, which
+    A density has a spike where energies are tied. A tie may be as wide as 0.1 in the logit of the level, which
     is 2.5 % of the muons in the middle of the spectrum and a tenth of those beyond it elsewhere, and it may take a
-    tenth of the outermost muons, to which the power laws are fitted.
+    tenth of the outermost muons.
 
     Raises
     ------

@@ -11,13 +11,21 @@ from numpy.typing import NDArray
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muons import Muons
 from deepmuon_runtime.physical import HIGHEST_ENERGY, LOWEST_ENERGY
-from deepmuon_training.learning.power_law import outermost
 
-__all__ = ["Stated", "Support"]
+__all__ = ["Stated", "Support", "outermost"]
 
 _STEEPEST_ENERGY, _STEEPEST_ZENITH = 8.0, 25.0
 """Exponents of a power law beyond which an end is a cut. Natural spectra end with 1 to 4, and cos zenith with 2 to 4;
 under kilometres of rock, where few muons come slanting, with 15."""
+
+_TAIL_MUONS = 1000
+_LARGEST_TAIL = 1 / 60
+"""No tail takes a larger share of the sample."""
+
+
+def outermost(number: int) -> int:
+    """Return how many muons of a sample of `number` make a tail, by which its end is judged."""
+    return min(_TAIL_MUONS, int(_LARGEST_TAIL * number))
 
 
 @dataclass(frozen=True)

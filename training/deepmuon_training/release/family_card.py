@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from pathlib import Path
+
+import numpy as np
 
 from deepmuon_training.export.metadata import Training
 from deepmuon_training.release.card import GENERAL_LIMITS, manifest_entry
 from deepmuon_training.scores.evaluation import Evaluation
+from deepmuon_training.scores.histograms import TailScore, compare_horizon
 
 __all__ = ["family_card"]
 
 _HEADING = (
-    *("depth [m]", "", "generated", "held out", "KS energy", "KS cos zenith", "delta", "charge chi²/ndf", "AUC"),
-    "rate / held out",
+    *("depth [m]", "", "generated", "held out", "KS energy", "KS cos zenith", "delta"),
+    *(f"cos zenith {low:g} to {low + 0.05:g}" for low in (0, 0.05, 0.1, 0.15)),
+    *("charge chi²/ndf", "AUC", "rate / held out"),
 )
 
 
 def family_card(
     model: Path,
     knots: Sequence[Training],
-    evaluations: Mapping[float, Evaluation],
+    evaluations: Mapping[tuple[float, int], Evaluation],
     *,
     command: str,
     notes: Sequence[str],
@@ -34,7 +38,7 @@ def family_card(
     knots
         What each was trained on, ascending in depth.
     evaluations
-        Against held-out muons, by depth in metres.
+        Against held-out muons, by depth in metres and surface: 0 for a horizontal plane, 1 for a sphere.
     command
         Makes the family again.
     notes
@@ -42,7 +46,7 @@ def family_card(
     """
     said = manifest_entry(model)
     range_ = f"{said['depth_min_m']} to {said['depth_max_m']} m"
-    depths = {knot.depth_m for knot in knots}
+    depths = {np.float32(knot.depth_m) for knot in knots}  # 0.1 and 0.2 m of water make no 0.3 in double precision
     return "\n".join(
         [
             f"# {said['architecture']}, {range_} of {said['medium']}",
@@ -77,7 +81,13 @@ def family_card(
             "",
             f"| {' | '.join(_HEADING)} |",
             "|---" * len(_HEADING) + "|",
-            *(_row(depth, depth in depths, evaluations[depth]) for depth in sorted(evaluations)),
+            *_rows(evaluations, 0, depths),
+            "",
+            "Muons through a sphere, of those of them that cross a horizontal plane:",
+            "",
+            f"| {' | '.join(_HEADING)} |",
+            "|---" * len(_HEADING) + "|",
+            *_rows(evaluations, 1, depths),
             "",
             "## Limits",
             "",
@@ -93,7 +103,15 @@ def _rate(knot: Training) -> str:
     return f"{knot.rate:.6g}" + ("" if knot.rate_uncertainty is None else f" ± {knot.rate_uncertainty:.2g}")
 
 
+def _rows(evaluations: Mapping[tuple[float, int], Evaluation], surface: int, knots: Set[np.float32]) -> Iterator[str]:
+    for depth, of in sorted(evaluations):
+        if of == surface:
+            yield _row(depth, np.float32(depth) in knots, evaluations[depth, of])
+
+
 def _row(depth: float, at_knot: bool, found: Evaluation) -> str:
+    generated, held_out = (spectra.by_cos_zenith for spectra in (found.generated_spectra, found.held_out_spectra))
+    horizon = compare_horizon(generated, held_out, found.variance_factor)
     rate = "" if found.rate is None else f"{found.rate.generated / found.rate.held_out:.4f}"
     cells = [
         f"{depth:g}",
@@ -102,8 +120,15 @@ def _row(depth: float, at_knot: bool, found: Evaluation) -> str:
         f"{found.held_out_muons:,}",
         *(f"{found.ks[column].excess:+.4f}" for column in ("energy", "cos zenith")),
         f"{found.cells.delta:.2%}",
+        *(_tail(tail) for tail in horizon),
         f"{found.charge.per_ndf:.2f}",
         f"{found.classifier.auc:.4f}",
         rate,
     ]
     return f"| {' | '.join(cells)} |"
+
+
+def _tail(tail: TailScore) -> str:
+    if tail.expected == 0:
+        return "none expected"
+    return f"{tail.found / tail.expected:.2f} ± {tail.error / tail.expected:.2f}"

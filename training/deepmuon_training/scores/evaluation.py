@@ -61,6 +61,9 @@ class Evaluation:
         What the pictures show.
     variance_factor : float
         How many times larger than of independent muons the variance of held-out counts was taken to be.
+    surface : int
+        What the generator's muons cross: 0 is a horizontal plane, 1 a sphere, of which those that cross a plane were
+        compared, see `deepmuon_training.scores.model_evaluation`.
     """
 
     generated_muons: int
@@ -83,6 +86,7 @@ class Evaluation:
     generated_spectra: Spectra
     held_out_spectra: Spectra
     variance_factor: float = 1.0
+    surface: int = 0
 
     def to_json(self) -> str:
         """Write everything as JSON."""

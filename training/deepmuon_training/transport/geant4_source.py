@@ -12,6 +12,7 @@ from typing import Any
 
 import geant4_pybind as g4
 
+from deepmuon_runtime.muon_file.format import COLUMNS
 from deepmuon_runtime.muons import MU_MINUS, MU_PLUS, Muons
 
 __all__ = ["MuonSource"]
@@ -95,4 +96,4 @@ class MuonSource(g4.G4VUserPrimaryGeneratorAction):
 
 
 def _rows(muons: Muons) -> Iterator[tuple[Any, ...]]:
-    return zip(*(getattr(muons, name).tolist() for name in muons.__dataclass_fields__), strict=True)
+    return zip(*(getattr(muons, name).tolist() for name in COLUMNS), strict=True)

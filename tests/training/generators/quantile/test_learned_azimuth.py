@@ -14,8 +14,7 @@ from deepmuon_training.generators.fitted import FittedGenerator, export_fitted
 from deepmuon_training.generators.quantile.azimuth_fit import AZIMUTH_BINS
 from deepmuon_training.generators.quantile.azimuth_table import LEVEL_KNOTS, TAIL_KNOTS, azimuth_turn
 from deepmuon_training.generators.quantile.circular_density import CircularDensity
-from deepmuon_training.generators.quantile.fit import QuantileSchedules
-from deepmuon_training.generators.quantile.regression import RegressionSteps
+from deepmuon_training.generators.quantile.fit import QuantileSettings
 from deepmuon_training.generators.quantile.tables import tabulate
 from deepmuon_training.generators.transformer.network import LATENTS
 from deepmuon_training.learning.descent import Schedule
@@ -24,11 +23,7 @@ from deepmuon_training.scores.azimuth import compare_azimuth
 from studies.pictures.mountain import behind_mountain
 
 TRAINED, COMPARED = 300_000, 400_000
-SETTINGS = QuantileSchedules(
-    zenith=RegressionSteps(adam=300, round=50, rounds=1),
-    charge=Schedule(steps=4, learning_rate=0.02, averaging=0.5, validate_every=2),
-    azimuth=Schedule(steps=500, learning_rate=0.01, averaging=0.98, validate_every=100),
-)
+SETTINGS = QuantileSettings(azimuth=Schedule(steps=500, learning_rate=0.01, averaging=0.98, validate_every=100))
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +82,7 @@ def test_the_shadow_is_as_deep_as_the_true_one_at_any_energy_and_zenith(generate
 
 def test_the_distribution_joins_smoothly_where_the_circle_closes(fitted):
     with torch.no_grad():
-        y = fitted.networks.pre_tanh(torch.linspace(-4, 4, 9))
+        y = torch.from_numpy(fitted.networks.y(np.linspace(-4, 4, 9))).float()
         log_density = fitted.networks.azimuth(y, torch.full_like(y, 0.5))
     step = log_density.diff(dim=1, append=log_density[:, :1]).abs()
     seam, elsewhere = step[:, -1], step[:, :-1].max(dim=1).values

@@ -1,4 +1,4 @@
-"""What `deepmuon-csv` says of muons in comments, believed where it can be, and where all of its muons are there."""
+"""What `deepmuon-convert` says of muons in comments, believed where it can be, and where all of its muons are there."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def known_of(table: Table) -> dict[str, Any]:
             raise RefusedError(f"{table.path}: a comment says {name} = {table.notes[name]!r}, which can't be")
     for name in ("depth_m", "medium", "created_by", "count"):
         if name not in known:
-            raise RefusedError(f"{table.path}: the comments of deepmuon-csv say no {name}")
+            raise RefusedError(f"{table.path}: the comments of deepmuon-convert say no {name}")
     return known
 
 

@@ -34,7 +34,7 @@ class Table:
     headings : tuple of str
         The names of the columns; none where the file has none.
     notes : mapping
-        What comments of `deepmuon-csv` say, by the names of a muon file's attributes.
+        What comments of `deepmuon-convert` say, by the names of a muon file's attributes.
     first_line : str
         Of a text, as it can be shown.
     """

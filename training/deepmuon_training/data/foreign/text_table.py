@@ -86,7 +86,7 @@ def open_text(path: str | Path, width: int | None = None, *, ends_with_newline: 
 
 
 def _notes(comments: Sequence[str]) -> dict[str, Any]:
-    """Return what the comments of `deepmuon-csv` say; nothing of other comments is believed."""
+    """Return what the comments of `deepmuon-convert` say; nothing of other comments is believed."""
     notes = {}
     for match in filter(None, map(NOTE.fullmatch, comments)):
         try:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from onnx import TensorProto
 
 from deepmuon_training.export.graph import Graph
-from deepmuon_training.export.graph_steps import bilinear, bilinear_cells, columns, locate, on_plane, place
+from deepmuon_training.export.graph_steps import bilinear, bilinear_cells, locate, look_up, on_plane, place
 from deepmuon_training.generators.quantile.azimuth_fit import AZIMUTH_BINS
 
 __all__ = ["LEVEL_KNOTS", "TAIL_KNOTS", "azimuth_turn", "azimuth_turn_graph"]
@@ -71,7 +71,7 @@ def azimuth_turn_graph(g: Graph, table: Float32, t: str, level: str, latent: str
     below, above = g.constant(-1.0), g.constant(1.0)
     for step in _STEPS:
         next_k = g("Add", k, np.array(step, dtype=np.int32))
-        middle = on_plane(g, columns(g, g("Gather", cells, next_k), 4), a, b)
+        middle = on_plane(g, [look_up(g, cell, next_k) for cell in cells], a, b)
         further = g("LessOrEqual", middle, latent)
         k = g("Where", further, next_k, k)
         below, above = g("Where", further, middle, below), g("Where", further, above, middle)

@@ -42,7 +42,7 @@ __all__ = [
     "energy_logits",
     "row_logits",
     "row_place",
-    "zenith_place",
+    "zenith_square",
 ]
 
 FINE_STEP = 2.0**-24
@@ -86,9 +86,9 @@ def energy_logit(l0: torch.Tensor, l1: torch.Tensor) -> torch.Tensor:
     return torch.log(((1 + l0) + fine) / ((1 - l0) + fine))
 
 
-def zenith_place(l2: torch.Tensor) -> torch.Tensor:
-    """Return the place of zenith for its latent, clamped before."""
-    return torch.sqrt((1 - l2) / (2 / ZENITH_CELLS**2 * (1 + HORIZON_WEIGHT * torch.sqrt(1 + l2))))
+def zenith_square(l2: torch.Tensor) -> torch.Tensor:
+    """Return the square of the place of zenith for its latent, clamped before."""
+    return (1 - l2) / (2 / ZENITH_CELLS**2 * (1 + HORIZON_WEIGHT * torch.sqrt(1 + l2)))
 
 
 def energy_logits() -> torch.Tensor:

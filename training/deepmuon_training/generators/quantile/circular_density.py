@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import nn
 
-from deepmuon_training.learning.monotone import perceptron
+from deepmuon_training.learning.perceptron import perceptron
 
 __all__ = ["CircularDensity"]
 

@@ -20,7 +20,7 @@ from deepmuon_training.families.knots import Knots, column_density_graph, risen,
 from deepmuon_training.families.rates import KnownRate, Rates
 from deepmuon_training.families.sphere import TriangularMap, through_sphere
 from deepmuon_training.generators.quantile.cells import column_logits, energy_logits, row_logits, row_place
-from deepmuon_training.generators.quantile.graph import LATENT_SIZE, NEAREST_HORIZON, quantile_graph
+from deepmuon_training.generators.quantile.graph import ENERGY_LATENTS, LATENT_SIZE, NEAREST_HORIZON, quantile_graph
 from deepmuon_training.generators.quantile.tables import QuantileTables
 
 __all__ = ["QuantileFamily", "quantile_family"]
@@ -55,6 +55,7 @@ class QuantileFamily:
 
     architecture = "quantile"
     latent_size = LATENT_SIZE
+    energy_latents = ENERGY_LATENTS
     muons_per_draw = 1
     surfaces = (0, 1)
 

@@ -16,9 +16,12 @@ from deepmuon_training.generators.quantile.azimuth_table import azimuth_turn_gra
 from deepmuon_training.generators.quantile.cells import ENERGY_PER_UNIT, FINE_STEP, HORIZON_WEIGHT, ZENITH_CELLS
 from deepmuon_training.generators.quantile.look_ups import look_ups_graph
 
-__all__ = ["LATENT_SIZE", "NEAREST_HORIZON", "quantile_graph"]
+__all__ = ["ENERGY_LATENTS", "LATENT_SIZE", "NEAREST_HORIZON", "quantile_graph"]
 
 LATENT_SIZE = 5
+
+ENERGY_LATENTS = (0, 1)
+"""The coarse and the fine one of the energy, by the contract."""
 
 NEAREST_HORIZON = 2.0**-20
 """Smallest cos zenith: no muon is horizontal, or goes up."""
@@ -64,10 +67,10 @@ def quantile_graph(
     with g.scope("zenith"):
         upper, lower = g("Sub", 1.0, l2), g("Add", l2, 1.0)
         unit = 2 / ZENITH_CELLS**2
-        place = g("Sqrt", g("Div", upper, g("Add", g("Mul", g("Sqrt", lower), unit * HORIZON_WEIGHT), unit)))
-        cell = g("Add", row, g("Cast", place, to=TensorProto.INT32))
+        square = g("Div", upper, g("Add", g("Mul", g("Sqrt", lower), unit * HORIZON_WEIGHT), unit))
+        cell = g("Add", row, g("Cast", g("Sqrt", square), to=TensorProto.INT32))
         start, slope = (look_up(g, x, cell) for x in (tables.versine_start, tables.versine_slope))
-        versine = g("Clip", g("Add", start, g("Mul", place, slope)), 0.0, 1 - NEAREST_HORIZON)
+        versine = g("Clip", g("Add", start, g("Mul", square, slope)), 0.0, 1 - NEAREST_HORIZON)
     with g.scope("charge"):
         sign = charge_sign(g, l4, look_up(g, tables.charge, cell))
     with g.scope("azimuth"):

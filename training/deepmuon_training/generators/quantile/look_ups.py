@@ -1,7 +1,9 @@
 """The large tables that a `quantile` generator's muons are read from, made of the coarse ones: in PyTorch, and in ONNX.
 
 Everything here depends on constants alone: runtimes compute it once, while they load the graph. Energies go from
-knot to knot of the coarse table linearly in ln E, columns of zenith in the logits of cos zenith and level.
+knot to knot of the coarse table linearly in ln E. Columns of zenith go from one to the next along the cubic through
+four of them (E. Catmull and R. Rom, 1974) in the logits of cos zenith and level: a straight line would let the density
+jump at each column, by some per cent. The charge goes along straight lines, and stays between -1 and 1.
 """
 
 from __future__ import annotations
@@ -47,7 +49,7 @@ class LookUps:
     row : int64 [4351]
         Number of its first cell of zenith.
     versine_start, versine_slope : [65 x 544]
-        1 - cos zenith, which has all its digits near the vertical, and to a cell.
+        1 - cos zenith, which has all its digits near the vertical, and to a unit of the place squared.
     charge : [65 x 544]
         2 P(mu+) - 1.
     """
@@ -77,20 +79,26 @@ def look_ups(energy: torch.Tensor, zenith: torch.Tensor, charge: torch.Tensor) -
     energy_slope = (knots[high + ENERGY_CELLS] - knots[low + ENERGY_CELLS]) / (high - low)
     number = torch.arange(ZENITH_CELLS + 1, dtype=energy.dtype)
     column = _level_logit(number) * _PER_COLUMN + COLUMNS // 2  # inside: the nearest level is
-    left = column.floor().long()
-    logit, threshold = (
-        table[:, left] + (column - left) * (table[:, left + 1] - table[:, left]) for table in (zenith, charge)
-    )
-    versine = 1 / (1 + torch.exp(logit))
-    versine_slope = versine.diff(dim=1)
+    distance = column - torch.arange(-1, COLUMNS + 1, dtype=energy.dtype).unsqueeze(1)
+    ends = 2 * zenith[:, :1] - zenith[:, 1:2], 2 * zenith[:, -1:] - zenith[:, -2:-1]
+    versine = 1 / (1 + torch.exp(torch.cat([ends[0], zenith, ends[1]], dim=1) @ _cubic(distance.abs())))
+    threshold = charge @ (1 - distance[1:-1].abs()).clamp(min=0)
+    square = number**2
+    versine_slope = versine.diff(dim=1) / square.diff()
     return LookUps(
         energy_start=knots[low + ENERGY_CELLS] - low * energy_slope,
         energy_slope=energy_slope,
         row=torch.from_numpy(ROW_OF_CELL).long() * ZENITH_CELLS,
-        versine_start=(versine[:, :-1] - number[:-1] * versine_slope).flatten(),
+        versine_start=(versine[:, :-1] - square[:-1] * versine_slope).flatten(),
         versine_slope=versine_slope.flatten(),
         charge=((threshold[:, :-1] + threshold[:, 1:]) / 2).flatten(),
     )
+
+
+def _cubic(distance: torch.Tensor) -> torch.Tensor:
+    """Return the weight of a column at a distance of so many columns."""
+    near, far = (1 - distance).clamp(min=0), (2 - distance).clamp(min=0)
+    return far**2 * (1 - distance) / 2 + near**2 * (2 * distance - 1)
 
 
 def _level_logit(place: torch.Tensor) -> torch.Tensor:
@@ -126,14 +134,18 @@ def look_ups_graph(g: Graph, energy: str, zenith: str, charge: str) -> LookUpsIn
     with g.scope("zenith/cells"):
         first = _first_cells(g)
         number = g("Range", 0.0, float(ZENITH_CELLS + 1), 1.0)
-        weights = _column_weights(g, number)
+        distance = _column_distance(g, number)
+        logit = g("MatMul", _continued(g, zenith), _cubic_graph(g, distance))
         # Some runtimes' Sigmoid is near 0 right to 1e-7 only, which is 4e-4 rad.
-        versine = g("Reciprocal", g("Add", g("Exp", g("MatMul", zenith, weights)), 1.0))
-        start, end = cut(g, versine, 1, 0, -1), cut(g, versine, 1, 1, END)
-        slope = g("Sub", end, start)
-        start = g("Sub", start, g("Mul", cut(g, number, 0, 0, -1), slope))
+        versine = g("Reciprocal", g("Add", g("Exp", logit), 1.0))
+        square = g("Mul", number, number)
+        low, start = cut(g, square, 0, 0, -1), cut(g, versine, 1, 0, -1)
+        rise = g("Sub", cut(g, versine, 1, 1, END), start)
+        slope = g("Div", rise, g("Sub", cut(g, square, 0, 1, END), low))
+        start = g("Sub", start, g("Mul", low, slope))
     with g.scope("charge/cells"):
-        threshold = g("MatMul", charge, weights)
+        straight = g("Relu", g("Sub", 1.0, cut(g, distance, 0, 1, -1)))
+        threshold = g("MatMul", charge, straight)
         both = g("Add", cut(g, threshold, 1, 0, -1), cut(g, threshold, 1, 1, END))
         middle = g("Mul", both, 0.5)
         return LookUpsInGraph(
@@ -178,8 +190,8 @@ def _cell_ends(g: Graph, knots: str) -> tuple[str, str]:
     return low, g("Concat", cut(g, knots, 0, zero + 1, END), cut(g, knots, 0, 1, zero), axis=0)
 
 
-def _column_weights(g: Graph, place: str) -> str:
-    """Return the weights [columns, places] that interpolate between the columns of a coarse table linearly."""
+def _column_distance(g: Graph, place: str) -> str:
+    """Return how many columns places are from each column, and from one more on both sides: [columns + 2, places]."""
     part = g("Mul", place, 1 / ZENITH_CELLS)
     x = g("Mul", part, part)
     inhomogeneous = g("Sub", 2.0, g("Mul", x, 2.0))
@@ -188,6 +200,22 @@ def _column_weights(g: Graph, place: str) -> str:
     upper = g("Max", g("Mul", x, g("Add", g("Mul", h, HORIZON_WEIGHT), 1.0)), _NEAREST_LEVEL)
     lower = g("Max", g("Mul", g("Mul", h, h), 0.5), _NEAREST_LEVEL)
     logit = g("Log", g("Div", lower, upper))
-    half = float(COLUMNS // 2)
-    columns = g("Reshape", g("Range", -half, half + 1, 1.0), np.array([-1, 1], dtype=np.int64))
-    return g("Relu", g("Sub", 1.0, g("Abs", g("Sub", g("Mul", logit, _PER_COLUMN), columns))))
+    beyond = float(COLUMNS // 2 + 1)
+    columns = g("Reshape", g("Range", -beyond, beyond + 1, 1.0), np.array([-1, 1], dtype=np.int64))
+    return g("Abs", g("Sub", g("Mul", logit, _PER_COLUMN), columns))
+
+
+def _continued(g: Graph, table: str) -> str:
+    """Continue a table by one column on both sides, in straight lines."""
+    left, right = (
+        g("Sub", g("Mul", cut(g, table, 1, end, after), 2.0), cut(g, table, 1, inner, next_after))
+        for end, after, inner, next_after in ((0, 1, 1, 2), (-1, END, -2, -1))
+    )
+    return g("Concat", left, table, right, axis=1)
+
+
+def _cubic_graph(g: Graph, distance: str) -> str:
+    """Build the weights of `_cubic`."""
+    near, far = (g("Relu", g("Sub", reach, distance)) for reach in (1.0, 2.0))
+    outer = g("Mul", g("Mul", far, far), g("Mul", g("Sub", 1.0, distance), 0.5))
+    return g("Add", outer, g("Mul", g("Mul", near, near), g("Sub", g("Mul", distance, 2.0), 1.0)))

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.special import expit
 
 from deepmuon_runtime.errors import FailedError
 from deepmuon_training.export.graph import Graph
@@ -34,9 +35,9 @@ from deepmuon_training.generators.quantile.cells import (
     energy_logit,
     energy_logits,
     row_logits,
-    zenith_place,
+    zenith_square,
 )
-from deepmuon_training.generators.quantile.graph import LATENT_SIZE, NEAREST_HORIZON, quantile_graph
+from deepmuon_training.generators.quantile.graph import ENERGY_LATENTS, LATENT_SIZE, NEAREST_HORIZON, quantile_graph
 from deepmuon_training.generators.quantile.look_ups import LookUps, look_ups
 from deepmuon_training.generators.quantile.maps import QuantileGenerator
 
@@ -60,7 +61,7 @@ class QuantileTables:
     energy_range : tuple of float
         Lowest and highest kinetic energy [GeV].
     energy_mean : float
-        Mean of x that the networks were trained with; for the record.
+        Mean of the transformed energy in training; for the record.
     azimuth : [41, 33, 129] or None
         As in `azimuth_table`; None where it is uniform.
     """
@@ -74,6 +75,7 @@ class QuantileTables:
 
     architecture = "quantile"
     latent_size = LATENT_SIZE
+    energy_latents = ENERGY_LATENTS
     muons_per_draw = 1
 
     def __call__(self, latent: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
@@ -85,9 +87,9 @@ class QuantileTables:
         place = t * ENERGY_PER_UNIT
         cell = place.trunc().long()
         energy = tables.energy_start[cell] + place * tables.energy_slope[cell]
-        row, place = tables.row[cell], zenith_place(l2)
-        cell = row + place.trunc().long()
-        versine = tables.versine_start[cell] + place * tables.versine_slope[cell]
+        row, square = tables.row[cell], zenith_square(l2)
+        cell = row + square.sqrt().trunc().long()
+        versine = tables.versine_start[cell] + square * tables.versine_slope[cell]
         versine = versine.clamp(0, 1 - NEAREST_HORIZON)
         sine = torch.sqrt(versine * (2 - versine))
         turn = l3
@@ -110,32 +112,27 @@ class QuantileTables:
 
 
 def tabulate(generator: QuantileGenerator) -> QuantileTables:
-    """Evaluate a generator's networks on the tables' knots.
+    """Evaluate a generator's maps on the tables' knots.
 
     Raises
     ------
     FailedError
-        If a map is not monotone in its latent.
+        If a map is no number somewhere.
     """
-    with torch.no_grad():
-        generator = copy.deepcopy(generator).double()
-        energy = torch.log(generator.transform.energy(generator.pre_tanh(energy_logits())))
-        columns = column_logits()
-        y = generator.pre_tanh(row_logits())
-        zenith = generator.cos_zenith_logit(columns.expand(len(y), -1), y)
-        positive = generator.charge(y.repeat_interleave(len(columns)), torch.sigmoid(zenith).flatten())
-        charge = torch.tanh(positive / 2).reshape(zenith.shape)
-        azimuth = _azimuth(generator)
+    energy = generator.log_energy(energy_logits().numpy())
+    columns, t = column_logits().numpy(), row_logits().numpy()
+    zenith = generator.cos_zenith_logit(columns, t)
     for name, values in (("energy", energy), ("zenith", zenith)):
-        if not (values.diff(dim=-1) >= 0).all():  # nor where one is no number
-            raise FailedError(f"the {name} map decreases somewhere: its latent must raise it everywhere")
+        if not np.isfinite(values).all():
+            raise FailedError(f"the {name} map is no number somewhere: its density was not learned")
+    positive = generator.charge_logit(np.repeat(t, len(columns)), zenith.ravel())
     return QuantileTables(
-        energy=energy.float().numpy(),
-        zenith=zenith.float().numpy(),
-        charge=charge.float().numpy(),
-        energy_range=(generator.tails.energy_min, generator.tails.energy_max),
+        energy=energy.astype(np.float32),
+        zenith=zenith.astype(np.float32),
+        charge=np.tanh(positive / 2).reshape(zenith.shape).astype(np.float32),
+        energy_range=generator.energy_range,
         energy_mean=generator.transform.mean,
-        azimuth=azimuth,
+        azimuth=_azimuth(generator),
     )
 
 
@@ -143,15 +140,17 @@ def _azimuth(generator: QuantileGenerator) -> Float32 | None:
     """Evaluate the azimuth's network on its table's knots."""
     if generator.azimuth is None:
         return None
-    y = generator.pre_tanh(TAIL_KNOTS)
-    cos_zenith = torch.sigmoid(generator.cos_zenith_logit(LEVEL_KNOTS.expand(len(y), -1), y))
-    cumulative = generator.azimuth.cumulative(y.repeat_interleave(len(LEVEL_KNOTS)), cos_zenith.flatten())
-    return (2 * cumulative - 1).float().reshape(len(TAIL_KNOTS), len(LEVEL_KNOTS), -1).numpy()
+    t, levels = TAIL_KNOTS.numpy(), LEVEL_KNOTS.numpy()
+    y = torch.from_numpy(generator.y(t)).repeat_interleave(len(levels))
+    cos_zenith = torch.from_numpy(expit(generator.cos_zenith_logit(levels, t))).flatten()
+    with torch.no_grad():
+        cumulative = copy.deepcopy(generator.azimuth).double().cumulative(y, cos_zenith)
+    return (2 * cumulative - 1).float().reshape(len(t), len(levels), -1).numpy()
 
 
 @dataclass(frozen=True)
 class TableError:
-    """How far tables are from the networks they were made of, root mean square and largest.
+    """How far tables are from the maps they were made of, root mean square and largest.
 
     The zenith is compared at the energy of the row that a muon reads.
 
@@ -171,27 +170,26 @@ class TableError:
     def __str__(self) -> str:
         """Say it in a sentence."""
         return (
-            f"The tables differ from the networks by {self.energy:.1e} of the energy (rms; at most "
+            f"The tables differ from the maps by {self.energy:.1e} of the energy (rms; at most "
             f"{self.largest_energy:.1e}) and {self.cos_zenith:.1e} in cos zenith "
             f"(at most {self.largest_cos_zenith:.1e})."
         )
 
 
 def table_error(generator: QuantileGenerator, tables: QuantileTables, *, seed: int, muons: int = 100_000) -> TableError:
-    """Compare tables with networks on random latents."""
+    """Compare tables with maps on random latents."""
     latent = 2 * torch.rand(muons, LATENT_SIZE, generator=torch.Generator().manual_seed(seed), dtype=torch.float64) - 1
-    with torch.no_grad():
-        found_energy, direction, _ = tables(latent)
-        t = energy_logit(latent[:, 0], latent[:, 1])
-        row = torch.from_numpy(ROW_OF_CELL).long()[(t * ENERGY_PER_UNIT).trunc().long()]
-        double = copy.deepcopy(generator).double()
-        y = double.pre_tanh(t)
-        level = torch.logit((1 + latent[:, 2:3]) / 2)
-        cos_zenith = torch.sigmoid(double.cos_zenith_logit(level, double.pre_tanh(row_logits()[row])))[:, 0]
-    energy = (found_energy / generator.transform.energy(y) - 1).abs()
-    angle = (-direction[:, 2] - cos_zenith).abs()
+    found_energy, direction, _ = tables(latent)
+    t = energy_logit(latent[:, 0], latent[:, 1])
+    row = ROW_OF_CELL[(t * ENERGY_PER_UNIT).trunc().long().numpy()]
+    level, cos_zenith = torch.logit((1 + latent[:, 2]) / 2).numpy(), np.empty(muons)
+    for number, at in enumerate(row_logits().numpy()):
+        mine = row == number
+        cos_zenith[mine] = expit(generator.cos_zenith_logit(level[mine], np.array([at]))[0])
+    energy = np.abs(found_energy.numpy() / np.exp(generator.log_energy(t.numpy())) - 1)
+    angle = np.abs(-direction[:, 2].numpy() - cos_zenith)
     return TableError(_rms(energy), float(energy.max()), _rms(angle), float(angle.max()))
 
 
-def _rms(values: torch.Tensor) -> float:
-    return float((values**2).mean().sqrt())
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -28,11 +28,11 @@ from deepmuon_training.export.graph_steps import (
     bilinear,
     bilinear_cells,
     charge_sign,
-    columns,
     interpolation_cells,
     kinetic_energy,
     linear,
     locate,
+    look_up,
     matrix,
     on_plane,
     place,
@@ -154,6 +154,7 @@ class TransformerModel:
     energy_range: tuple[float, float]
 
     architecture = "transformer"
+    energy_latents = None
 
     @classmethod
     def stored(cls, network: Transformer, **others: Any) -> TransformerModel:
@@ -212,22 +213,30 @@ class TransformerModel:
     def graph(self) -> tuple[Graph, str, str, str]:
         """Build the same in ONNX; returns the graph and the names of its energy, direction and charge."""
         g, d = Graph(), self.network.d
-        latent = g("Clip", "latent", -LARGEST_LATENT, LARGEST_LATENT)
-        sizes = np.array([LATENTS, d, d], dtype=np.int64)
-        noise, charge_latent, keys = g.several("Split", 3, latent, sizes, axis=1)
-        order = g.several("TopK", 2, keys, np.array([d], dtype=np.int64), axis=1)[1]
-        order = g("Unsqueeze", order, np.array([2], dtype=np.int64))
-        tokens = self._network_graph(g, noise)
         flat = np.array([-1], dtype=np.int64)
-        pre_tanh, x_atanh, y_atanh = (
-            g("Reshape", g("GatherND", token, order, batch_dims=1), flat)
-            for token in (g("Gather", tokens, np.array(k, dtype=np.int64), axis=1) for k in range(3))
-        )
-        x = g("Add", pre_tanh, self.transform.mean)
-        direction, cos_zenith = self._direction_graph(g, g("Tanh", x_atanh), g("Tanh", y_atanh))
-        threshold = self._threshold_graph(g, x, cos_zenith)
-        charge = charge_sign(g, g("Reshape", charge_latent, flat), threshold)
-        return g, kinetic_energy(g, x, self.energy_range), direction, charge
+        with g.scope("latent"):
+            latent = g("Clip", "latent", -LARGEST_LATENT, LARGEST_LATENT)
+            sizes = np.array([LATENTS, d, d], dtype=np.int64)
+            noise, charge_latent, keys = g.several("Split", 3, latent, sizes, axis=1)
+        with g.scope("order"):
+            order = g.several("TopK", 2, keys, np.array([d], dtype=np.int64), axis=1)[1]
+            order = g("Unsqueeze", order, np.array([2], dtype=np.int64))
+        with g.scope("network"):
+            tokens = self._network_graph(g, noise)
+        with g.scope("order"):
+            pre_tanh, x_atanh, y_atanh = (
+                g("Reshape", g("GatherND", token, order, batch_dims=1), flat)
+                for token in (g("Gather", tokens, np.array(k, dtype=np.int64), axis=1) for k in range(3))
+            )
+        with g.scope("direction"):
+            direction, cos_zenith = self._direction_graph(g, g("Tanh", x_atanh), g("Tanh", y_atanh))
+        with g.scope("charge"):
+            x = g("Add", pre_tanh, self.transform.mean)
+            threshold = self._threshold_graph(g, x, cos_zenith)
+            charge = charge_sign(g, g("Reshape", charge_latent, flat), threshold)
+        with g.scope("energy"):
+            energy = kinetic_energy(g, x, self.energy_range)
+        return g, energy, direction, charge
 
     def _network_graph(self, g: Graph, noise: str) -> str:
         network, d = self.network, self.network.d
@@ -244,7 +253,7 @@ class TransformerModel:
         radius = g("Sqrt", g("Add", g("Mul", cos_x, cos_x), g("Mul", cos_y, cos_y)))
         floor, inside = place(g, radius, _RADIUS_KNOTS / _RADIUS_REACH)
         cell = g("Cast", floor, to=TensorProto.INT32)
-        start, slope = columns(g, g("Gather", interpolation_cells(g, self.angle), cell), 2)
+        start, slope = (look_up(g, table, cell) for table in interpolation_cells(g, self.angle))
         zenith = g("Add", start, g("Mul", inside, slope))
         stretch = g("Div", g("Sin", zenith), g("Max", radius, _SMALLEST_RADIUS))
         cos_zenith = g("Cos", zenith)
@@ -256,7 +265,7 @@ class TransformerModel:
         row, a = place(g, g("Clip", row_position, 0.0, rows - 1 - 1e-3), 1.0)
         column, b = place(g, g("Clip", g("Mul", cos_zenith, float(cols - 1)), 0.0, cols - 1 - 1e-3), 1.0)
         cell = g("Cast", g("Add", g("Mul", row, float(cols - 1)), column), to=TensorProto.INT32)
-        return on_plane(g, columns(g, g("Gather", bilinear_cells(g, self.charge.values), cell), 4), a, b)
+        return on_plane(g, [look_up(g, table, cell) for table in bilinear_cells(g, self.charge.values)], a, b)
 
 
 _SMALLEST_RADIUS = 1e-12

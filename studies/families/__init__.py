@@ -1,0 +1,1 @@
+"""The families: what lies between their knots."""
