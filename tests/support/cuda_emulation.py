@@ -23,7 +23,7 @@ WORDS = """
 #define __global__
 #define __device__ static
 struct Place { unsigned int x; };
-static Place blockIdx, blockDim, threadIdx;
+static thread_local Place blockIdx, blockDim, threadIdx;
 static unsigned long long __umul64hi(unsigned long long a, unsigned long long b)
 {
     return (unsigned long long)((unsigned __int128)a * b >> 64);
@@ -96,14 +96,22 @@ def _passed(argument: Any) -> Any:
     return kinds[type(argument)](argument.item())
 
 
-def cupy() -> ModuleType:
-    """Return a module to stand for CuPy."""
-    module = ModuleType("cupy")
+class OutOfMemoryError(MemoryError):
+    """CuPy's."""
+
+
+def modules() -> dict[str, ModuleType]:
+    """Return modules to stand for CuPy's, by name."""
+    cupy, cupyx = ModuleType("cupy"), ModuleType("cupyx")
     stream = SimpleNamespace(synchronize=lambda: None)
-    module.__dict__.update(
+    cupy.__dict__.update(
         empty=array,
+        asarray=lambda column: np.array(column).view(Array),
         ndarray=Array,
         RawModule=RawModule,
-        cuda=SimpleNamespace(get_current_stream=lambda: stream),
+        cuda=SimpleNamespace(
+            get_current_stream=lambda: stream, memory=SimpleNamespace(OutOfMemoryError=OutOfMemoryError)
+        ),
     )
-    return module
+    cupyx.__dict__.update(empty_pinned=np.empty)
+    return {"cupy": cupy, "cupyx": cupyx}

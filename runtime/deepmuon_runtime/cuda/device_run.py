@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["DeviceRun"]
 
 NONE_IS_BAD = 2**64 - 1
+MEMORY = "cuda"  # where ONNX Runtime finds arrays by their addresses
 
 
 class DeviceRun:
@@ -56,12 +57,7 @@ class DeviceRun:
 
     @staticmethod
     def _bind(bind: Any, name: str, array: Any) -> None:
-        bind(name, "cuda", 0, array.dtype.type, array.shape, array.data.ptr)
-
-    def empty(self, n: int) -> Muons:
-        """Return n muons in the GPU's memory whose columns, CuPy arrays, are yet to be filled."""
-        energy, u, v, w = (self._cupy.empty(n, np.float32) for _ in range(4))
-        return Muons(energy, u, v, w, self._cupy.empty(n, np.int8))
+        bind(name, MEMORY, 0, array.dtype.type, array.shape, array.data.ptr)
 
     def fill(self, muons: Muons, seed: int, stream: int, block: int, skipped: int) -> int | None:
         """Fill columns in the GPU's memory with muons of one block.
