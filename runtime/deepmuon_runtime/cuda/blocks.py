@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,18 +18,13 @@ if TYPE_CHECKING:
 
     from deepmuon_runtime.model.metadata import Model
 
-__all__ = ["INSTALL", "DeviceBlocks", "has_cupy"]
+__all__ = ["INSTALL", "DeviceBlocks"]
 
 INSTALL = "pip install 'deepmuon-runtime[cuda]'"
 """What brings CuPy."""
 
 BLOCK = 1 << 22
 """Muons of one run of the network, about: a GPU wants so many at once."""
-
-
-def has_cupy() -> bool:
-    """Tell whether CuPy is installed, without importing it."""
-    return find_spec("cupy") is not None
 
 
 class DeviceBlocks:

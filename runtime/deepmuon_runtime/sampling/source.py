@@ -58,7 +58,8 @@ class Source:
         """What makes this model's muons in a GPU's memory alone, where it runs on one and CuPy is installed."""
         if self.device != "cuda":
             return None
-        from deepmuon_runtime.cuda.blocks import INSTALL, DeviceBlocks, has_cupy
+        from deepmuon_runtime.cuda.blocks import INSTALL, DeviceBlocks
+        from deepmuon_runtime.model.device import has_cupy
 
         if not has_cupy():
             warnings.warn(f"random numbers for the GPU come from the processor, which is slow: {INSTALL}", stacklevel=6)

@@ -12,7 +12,7 @@ from support.tiny_models import RARELY_BAD, tiny_model
 
 from deepmuon_runtime import Cuts, FailedError, Generator, Muons, Plane, RefusedError, read_muons
 from deepmuon_runtime.cuda import blocks, device_run
-from deepmuon_runtime.model import opening
+from deepmuon_runtime.model import device, opening
 
 N = 3000  # several blocks, and a part of one
 BLOCK = 1 << 10
@@ -23,13 +23,13 @@ def gpu(monkeypatch):
     """A machine with a GPU, onnxruntime-gpu and CuPy."""
     on_cpu = opening.open_session
 
-    def on_gpu(content, name, device):
-        return on_cpu(content, name, "cpu")[0], "cpu" if device == "cpu" else "cuda"
+    def on_gpu(content, name, asked):
+        return on_cpu(content, name, "cpu")[0], "cpu" if asked == "cpu" else "cuda"
 
     monkeypatch.setattr(opening, "open_session", on_gpu)
     for name, module in cuda_emulation.modules().items():
         monkeypatch.setitem(sys.modules, name, module)
-    monkeypatch.setattr(blocks, "has_cupy", lambda: True)
+    monkeypatch.setattr(device, "has_cupy", lambda: True)
     monkeypatch.setattr(blocks, "BLOCK", BLOCK)
     monkeypatch.setattr(device_run, "MEMORY", "cpu")
     value_of = onnxruntime.OrtValue.ortvalue_from_numpy
@@ -39,7 +39,7 @@ def gpu(monkeypatch):
 
 @pytest.fixture
 def without_cupy(gpu, monkeypatch):
-    monkeypatch.setattr(blocks, "has_cupy", lambda: False)
+    monkeypatch.setattr(device, "has_cupy", lambda: False)
 
 
 def of_cpu(model_file, **asked) -> Muons:
@@ -129,7 +129,7 @@ def test_more_than_a_gpu_holds_is_refused(model_file, monkeypatch):
 
 @pytest.mark.usefixtures("without_cupy")
 def test_without_cupy_muons_come_with_a_hint_and_stay_in_the_computers_memory(model_file):
-    generator = Generator.open(file=model_file)
+    generator = Generator.open(file=model_file, device="cuda")
     n = 300_000  # more than a block
     with pytest.warns(UserWarning, match=r"pip install 'deepmuon-runtime\[cuda\]'"):
         muons = generator.sample(n, seed=3)
@@ -137,6 +137,15 @@ def test_without_cupy_muons_come_with_a_hint_and_stay_in_the_computers_memory(mo
     assert_same(muons, of_cpu(model_file, n=n, seed=3))
     with pytest.raises(RefusedError, match=r"CuPy's arrays: pip install 'deepmuon-runtime\[cuda\]'"):
         generator.sample(10, seed=3, on_device=True)
+
+
+@pytest.mark.usefixtures("gpu")
+@pytest.mark.parametrize(("architecture", "taken"), [("quantile", "cpu"), ("transformer", "cuda")])
+def test_auto_is_the_processor_for_quantile_without_cupy(monkeypatch, architecture, taken):
+    assert Generator.open(10, architecture).device == "cuda"
+    monkeypatch.setattr(device, "has_cupy", lambda: False)
+    assert Generator.open(10, architecture).device == taken
+    assert Generator.open(10, architecture, device="cuda").device == "cuda"
 
 
 def test_muons_of_a_processor_can_not_stay_on_a_gpu(model_file):
