@@ -66,14 +66,25 @@ async function open(page) {
 
 /**
  * @param {Page} page
- * @param {{depth?: number, architecture?: string, number?: string, seed?: string}} wanted
+ * @param {{depth?: number | string, metres?: number, architecture?: string, number?: string, seed?: string}} wanted
  */
-async function generate(page, { depth, architecture, number = "50000", seed = "" }) {
+async function generate(page, { depth, metres, architecture, number = "50000", seed = "" }) {
     if (depth !== undefined) await page.getByLabel("Depth").selectOption(String(depth));
     if (architecture !== undefined) await page.getByLabel("Architecture").selectOption(architecture);
+    if (metres !== undefined) await page.getByLabel("Metres of water").fill(String(metres));
     await page.getByLabel("Muons", { exact: true }).fill(number);
     await page.getByLabel("Seed").fill(seed);
     await page.getByRole("button", { name: "Generate" }).click();
+}
+
+/**
+ * What has to be chosen for a model, of a family at the depth that it says.
+ *
+ * @param {import("../../../docs/live/models.js").Model} model
+ */
+function choicesOf(model) {
+    const { depth_m, architecture } = model;
+    return isFamily(model) ? { depth: "any", metres: depth_m, architecture } : { depth: depth_m, architecture };
 }
 
 /** @param {Page} page */
@@ -119,7 +130,7 @@ print(json.dumps([column.tolist() for column in columns]))`;
 testPage("every released model gives the muons that the package makes of the same seed", async (page) => {
     const number = 20_000;
     for (const model of released.models) {
-        await generate(page, { depth: model.depth_m, architecture: model.architecture, number: "2e4", seed: "1" });
+        await generate(page, { ...choicesOf(model), number: "2e4", seed: "1" });
         await finished(page);
         const { name, header, muons } = await saveCsv(page);
         assert.equal(name, `muons-${model.architecture}-${model.depth_m}m-seed-1.csv`);
@@ -147,7 +158,7 @@ testPage("the energies fill the spectrum of muons kept out of the training", asy
         released.models.find(({ held_out }) => held_out)
     );
     const held = /** @type {import("../../../docs/live/models.js").Counts} */ (model.held_out).by_energy;
-    await generate(page, { depth: model.depth_m, architecture: model.architecture, number: "2e5", seed: "3" });
+    await generate(page, { ...choicesOf(model), number: "2e5", seed: "3" });
     await finished(page);
     const { muons } = await saveCsv(page);
     const total = held.reduce((sum, count) => sum + count, 0);
@@ -362,8 +373,8 @@ test("once loaded, the page works without a network, every model too", { timeout
         await context.setOffline(true);
         await page.reload();
         await page.locator("#generate:enabled").waitFor();
-        for (const { depth_m, architecture } of released.models) {
-            await generate(page, { depth: depth_m, architecture, number: "1000" });
+        for (const model of released.models) {
+            await generate(page, { ...choicesOf(model), number: "1000" });
             await finished(page);
             assert.equal(await page.locator("#made").innerText(), "1,000");
         }
