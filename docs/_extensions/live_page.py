@@ -19,6 +19,9 @@ from sphinx.util import logging
 from sphinx.util.typing import ExtensionMetadata
 
 from deepmuon_runtime import Generator, Model, list_models
+from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.model.family import at_depth
+from deepmuon_runtime.model.metadata import SPHERE
 from deepmuon_runtime.model.released import default_architecture, read_released
 
 __all__ = ["setup"]
@@ -33,6 +36,7 @@ MODEL_FIELDS = (
     "architecture",
     "flux",
     "medium",
+    "surface",
     "depth_m",
     "depth_min_m",
     "depth_max_m",
@@ -49,8 +53,10 @@ def build_live_page(app: Sphinx, exception: Exception | None) -> None:
     if exception is not None or app.builder.format != "html":
         return
     source, target = Path(app.srcdir, PAGE), Path(app.outdir, PAGE)
-    for script in [*source.glob("*.js"), *source.glob("*.css")]:
-        shutil.copy(script, target)
+    for script in [*source.rglob("*.js"), *source.glob("*.css")]:
+        copy = target / script.relative_to(source)
+        copy.parent.mkdir(exist_ok=True)
+        shutil.copy(script, copy)
     if (source / "engine").exists():
         shutil.copytree(source / "engine", target / "engine", dirs_exist_ok=True)
     else:
@@ -82,7 +88,22 @@ def describe(model: Model, evaluations: Path) -> dict[str, object]:
         raise ExtensionError(f"the live page needs the rate of {model.name}, which does not know it")
     evaluation = evaluations / f"{Path(model.name).stem}.json"
     held_out = read_held_out(evaluation) if evaluation.exists() else None
-    return {field: getattr(model, field) for field in MODEL_FIELDS} | {"held_out": held_out, "rates": read_rates(model)}
+    return {field: getattr(model, field) for field in MODEL_FIELDS} | {
+        "held_out": held_out,
+        "rates": read_rates(model),
+        "has_sphere": has_sphere(model),
+    }
+
+
+def has_sphere(model: Model) -> bool:
+    """Tell whether a model is a family with the flux through a sphere, which targets need."""
+    if not model.is_family:
+        return False
+    try:
+        at_depth(read_released(model), model.depth_m, SPHERE)
+    except RefusedError:
+        return False
+    return True
 
 
 def read_rates(model: Model) -> list[tuple[float, float | None]] | None:

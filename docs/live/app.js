@@ -6,6 +6,7 @@ import { fetchReleased, place } from "./models.js";
 import { workOffline } from "./offline.js";
 import { element } from "./page.js";
 import { Results } from "./results.js";
+import { TargetView } from "./target/view.js";
 import { count, duration, rounded } from "./words.js";
 
 /** @typedef {import("./models.js").Model} Model */
@@ -27,6 +28,7 @@ class App {
     /** @param {import("./models.js").Released} released */
     constructor(released) {
         this.results = new Results();
+        this.target = new TargetView();
         this.choices = new Choices(
             released,
             () => this.pick(),
@@ -60,12 +62,14 @@ class App {
         saveButton.disabled = true;
         status.textContent = "";
         this.results.begin(this.choices.model, this.choices.surface);
+        this.target.follow(this.choices.family);
     }
 
-    /** The slider moves, and the spectrum with it. */
+    /** The slider moves, and with it the spectrum and what hits the target. */
     follow() {
         this.blocks = 0;
         saveButton.disabled = true;
+        this.target.follow(this.choices.family);
         this.isBehind = true;
         this.following ??= this.catchUp().finally(() => {
             this.following = undefined;

@@ -4,7 +4,12 @@
 const GRAPH = 7;
 const INITIALIZER = 5;
 const NAME = 8;
-const NUMBER = [4, 9]; // float_data, raw_data
+const FLOAT_DATA = 4;
+const INT32_DATA = 5;
+const RAW_DATA = 9;
+
+/** The surface that sees muons from all sides alike. */
+export const SPHERE = 1;
 
 /**
  * A family with a depth in it: the four bytes of its initializer `depth_m` are replaced, and what follows from them any
@@ -12,25 +17,42 @@ const NUMBER = [4, 9]; // float_data, raw_data
  *
  * @param {ArrayBuffer} contents of the ONNX file
  * @param {number} depth in metres of its medium, within its range
- * @throws {Error} in words, if the file is no family
+ * @param {number} [surface] what its muons cross: a horizontal plane, or `SPHERE`
+ * @throws {Error} in words, if the file is no family, or one without that surface
  */
-export function atDepth(contents, depth) {
+export function atDepth(contents, depth, surface = 0) {
     const bytes = new Uint8Array(contents.slice(0));
-    const named = new TextEncoder().encode("depth_m").join();
+    const place = placeOf(bytes, "depth_m", FLOAT_DATA);
+    if (place?.length !== 4) throw new Error("The file is no family: there is no depth to be set.");
+    new DataView(place.buffer, place.byteOffset, 4).setFloat32(0, depth, true);
+    if (surface !== 0) {
+        const byte = placeOf(bytes, "surface", INT32_DATA); // the lowest of four, or a packed number
+        if (!byte) throw new Error("The file has no muons of a sphere: there is no surface to be set.");
+        byte[0] = surface;
+    }
+    return bytes;
+}
+
+/**
+ * The bytes that hold the number of an initializer, if there is one such number.
+ *
+ * @param {Uint8Array<ArrayBuffer>} model
+ * @param {string} name of the initializer
+ * @param {number} data the field of numbers of its type, where they are not raw
+ */
+function placeOf(model, name, data) {
+    const named = new TextEncoder().encode(name).join();
     const places = [];
-    for (const graph of fields(bytes)) {
+    for (const graph of fields(model)) {
         if (graph.number !== GRAPH) continue;
         for (const tensor of fields(graph.bytes)) {
             if (tensor.number !== INITIALIZER) continue;
             const inside = [...fields(tensor.bytes)];
             if (!inside.some(({ number, bytes }) => number === NAME && bytes.join() === named)) continue;
-            places.push(...inside.filter(({ number, bytes }) => NUMBER.includes(number) && bytes.length === 4));
+            places.push(...inside.filter(({ number, bytes }) => [data, RAW_DATA].includes(number) && bytes.length > 0));
         }
     }
-    if (places.length !== 1) throw new Error("The file is no family: there is no depth to be set.");
-    const [{ bytes: place }] = places;
-    new DataView(place.buffer, place.byteOffset, 4).setFloat32(0, depth, true);
-    return bytes;
+    return places.length === 1 ? places[0].bytes : undefined;
 }
 
 /**

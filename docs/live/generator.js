@@ -31,7 +31,7 @@ export class Generator {
         const [ort, latents] = await Promise.all([openOnnxRuntime(), openLatents()]);
         const bytes = await fetchModel(model);
         try {
-            const placed = isFamily(model) ? atDepth(bytes, model.depth_m) : new Uint8Array(bytes);
+            const placed = isFamily(model) ? atDepth(bytes, model.depth_m, model.surface) : new Uint8Array(bytes);
             const session = await ort.InferenceSession.create(placed, { executionProviders: ["wasm"] });
             return new Generator(model, ort, session, latents);
         } catch (error) {
@@ -49,17 +49,34 @@ export class Generator {
      * @throws {Error} in words, if the model fails
      */
     async sample(seed, first, count) {
-        const { name, latent_size, muons_per_draw } = this.model;
+        const { latent_size, muons_per_draw } = this.model;
         const draws = Math.ceil(count / muons_per_draw);
         const latent = this.latents.draw(seed, this.stream, first / muons_per_draw, draws, latent_size);
+        const { energy, direction, charge } = await this.make(latent);
+        return {
+            energy: energy.subarray(0, count),
+            direction: direction.subarray(0, 3 * count),
+            charge: charge.subarray(0, count),
+        };
+    }
+
+    /**
+     * The muons of latents, and of a family how many come a second and m².
+     *
+     * @param {Float32Array} latent those of each draw
+     * @returns {Promise<import("./tally.js").Muons & {flux: number | undefined}>}
+     * @throws {Error} in words, if the model fails
+     */
+    async make(latent) {
+        const { name, latent_size } = this.model;
+        const shape = [latent.length / latent_size, latent_size];
         try {
-            const made = await this.session.run({
-                latent: new this.ort.Tensor("float32", latent, [draws, latent_size]),
-            });
+            const made = await this.session.run({ latent: new this.ort.Tensor("float32", latent, shape) });
             return {
-                energy: /** @type {Float32Array} */ (made.kinetic_energy.data).subarray(0, count),
-                direction: /** @type {Float32Array} */ (made.direction.data).subarray(0, 3 * count),
-                charge: /** @type {Int8Array} */ (made.charge.data).subarray(0, count),
+                energy: /** @type {Float32Array} */ (made.kinetic_energy.data),
+                direction: /** @type {Float32Array} */ (made.direction.data),
+                charge: /** @type {Int8Array} */ (made.charge.data),
+                flux: /** @type {Float32Array | undefined} */ (made.rate_hz_per_m2?.data)?.[0],
             };
         } catch (error) {
             throw new Error(`The model ${name} failed: ${reason(error)}`);

@@ -3,12 +3,18 @@
  *
  * @typedef {object} RandomModule
  * @property {WebAssembly.Memory} memory
- * @property {(blocks: number, seed: bigint, stream: bigint, firstBlock: bigint) => void} fill_latents
+ * @property {(blocks: number, seed: bigint, stream: bigint, purpose: bigint, firstBlock: bigint) => void} fill_latents
  */
 
 const LARGEST_SEED = 2n ** 64n - 1n;
 const PAGE = 65536; // bytes
 const BLOCK = 8; // latents
+
+/** The purpose of the numbers that make muons. */
+export const FOR_LATENTS = 0n;
+
+/** The purpose of the numbers that put muons where they enter a target. */
+export const FOR_PLACES = 2n;
 
 /** Draws of these begin with a whole block, whatever the latents of a draw. */
 export const DRAWS_STEP = BLOCK;
@@ -68,14 +74,15 @@ export class Latents {
      * @param {number} first of the draws, a multiple of `DRAWS_STEP`
      * @param {number} draws
      * @param {number} latentSize
+     * @param {bigint} [purpose]
      */
-    draw(seed, stream, first, draws, latentSize) {
+    draw(seed, stream, first, draws, latentSize, purpose = FOR_LATENTS) {
         const { memory, fill_latents } = this.module;
         const blocks = Math.ceil((draws * latentSize) / BLOCK);
         const missing = blocks * BLOCK * Float32Array.BYTES_PER_ELEMENT - memory.buffer.byteLength;
         if (missing > 0) memory.grow(Math.ceil(missing / PAGE));
         const firstBlock = BigInt((first / BLOCK) * latentSize);
-        fill_latents(blocks, BigInt.asIntN(64, seed), BigInt.asIntN(64, stream), firstBlock);
+        fill_latents(blocks, BigInt.asIntN(64, seed), BigInt.asIntN(64, stream), purpose, firstBlock);
         return new Float32Array(memory.buffer, 0, draws * latentSize);
     }
 }

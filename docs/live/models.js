@@ -7,6 +7,8 @@
  * @property {string} architecture
  * @property {string} flux
  * @property {string} medium
+ * @property {number} surface what its muons cross, 0 for a horizontal plane
+ * @property {boolean} has_sphere whether it has the muons of a sphere too
  * @property {number} depth_m of a family, the one that is chosen
  * @property {number | null} depth_min_m of a family: it has any depth from this to the next
  * @property {number | null} depth_max_m

@@ -25,10 +25,10 @@
                     (i64.and (local.get $middle) (i64.const 0xffffffff)))
                 (i64.const 32))))
 
-    ;; The four words at the counter (counter, 0, 0, 0), for the latents, under the key (seed, stream).
-    (func $philox (export "philox") (param $counter i64) (param $seed i64) (param $stream i64)
+    ;; The four words at the counter (counter, 0, 0, purpose) under the key (seed, stream).
+    (func $philox (export "philox") (param $counter i64) (param $seed i64) (param $stream i64) (param $d i64)
         (result i64 i64 i64 i64)
-        (local $a i64) (local $b i64) (local $c i64) (local $d i64)
+        (local $a i64) (local $b i64) (local $c i64)
         (local $previous_a i64) (local $round i32)
         (local.set $a (local.get $counter))
         (loop $rounds
@@ -64,11 +64,12 @@
             (call $latent (i32.wrap_i64 (i64.shr_u (local.get $word) (i64.const 32))))))
 
     ;; Fill the memory from address 0 with the latents of whole blocks, eight a block, from a block on.
-    (func (export "fill_latents") (param $blocks i32) (param $seed i64) (param $stream i64) (param $first_block i64)
+    (func (export "fill_latents")
+        (param $blocks i32) (param $seed i64) (param $stream i64) (param $purpose i64) (param $first_block i64)
         (local $address i32) (local $a i64) (local $b i64) (local $c i64) (local $d i64)
         (loop $next
             (local.set $first_block (i64.add (local.get $first_block) (i64.const 1))) ;; the first has counter 1
-            (call $philox (local.get $first_block) (local.get $seed) (local.get $stream))
+            (call $philox (local.get $first_block) (local.get $seed) (local.get $stream) (local.get $purpose))
             (local.set $d) (local.set $c) (local.set $b) (local.set $a)
             (call $write (local.get $address) (local.get $a))
             (call $write (i32.add (local.get $address) (i32.const 8)) (local.get $b))

@@ -19,7 +19,7 @@ export class Results {
         this.sky = new Sky(element("sky", HTMLCanvasElement));
         const stillness = matchMedia("(prefers-reduced-motion: reduce)");
         stillness.onchange = () => this.move(!stillness.matches);
-        motion.onclick = () => this.move(!this.sky.playing);
+        motion.onclick = () => this.move(!this.sky.clock.playing);
         this.move(!stillness.matches);
     }
 

@@ -3,14 +3,15 @@
  * middle is the zenith, the edge the horizon. A muon shines up, and stays as a faint point, as on a long exposure.
  */
 
+import { Clock } from "./clock.js";
+import { colourOf, decadesOf } from "./energy_colours.js";
+
 const FLASH = 1.5; // seconds for which a muon shines
-const LONGEST_STEP = 0.25; // seconds; a longer one, as of a hidden tab, is not made up for
 const STILL = 3000; // muons of a sky without motion
 const KEPT = 100_000; // muons; after the last the first come again
 const FINEST = 2; // device pixels to a CSS pixel, at most
 const POINT = 1.5; // CSS pixels that a point of the exposure is wide
 const RINGS = [30, 60, 90]; // degrees from the zenith
-const COLOURS = ["#ff7a59", "#ffb85c", "#fff1c9", "#9fd3ff", "#5f9dff"]; // from 0.1, 1, 10, 100 GeV on
 
 /** @typedef {{x: number, y: number, radius: number, colour: string, time: number}} Arrival where, as a share of the radius of the sky */
 
@@ -26,7 +27,7 @@ export class Sky {
         this.pixel = 1; // a pixel of the style sheet, in those
         this.known = 0;
         this.rate = 0;
-        this.playing = false;
+        this.clock = new Clock((seconds) => this.advance(seconds));
         this.seconds = 0;
         this.next = 0; // when the next muon arrives
         this.arrived = 0;
@@ -51,27 +52,18 @@ export class Sky {
         const added = arrivals.subarray(0, this.muons.length - 3 * this.known);
         this.muons.set(added, 3 * this.known);
         this.known += added.length / 3;
-        if (!this.playing) this.rest();
+        if (!this.clock.playing) this.rest();
     }
 
     play() {
-        if (this.playing) return;
-        this.playing = true;
+        if (this.clock.playing) return;
         this.rewind();
-        let last = performance.now();
-        /** @param {number} now */
-        const frame = (now) => {
-            if (!this.playing) return;
-            this.advance(Math.min(LONGEST_STEP, (now - last) / 1000));
-            last = now;
-            requestAnimationFrame(frame);
-        };
-        requestAnimationFrame(frame);
+        this.clock.play();
     }
 
     /** Stop, and show many muons at once. */
     pause() {
-        this.playing = false;
+        this.clock.pause();
         this.rewind();
         this.rest();
     }
@@ -107,14 +99,13 @@ export class Sky {
     arrive() {
         const i = 3 * (this.arrived++ % this.known);
         const [energy, u, v] = this.muons.subarray(i, i + 3);
-        const decade = Math.log10(energy) + 1;
         const horizontal = Math.hypot(u, v);
         const share = Math.asin(Math.min(1, horizontal)) / (Math.PI / 2) / Math.max(horizontal, 1e-9);
         return {
             x: -u * share, // it comes from where it does not go
             y: v * share,
-            radius: 1.6 + 0.6 * Math.max(0, Math.min(4, decade)),
-            colour: COLOURS[Math.max(0, Math.min(COLOURS.length - 1, Math.floor(decade)))],
+            radius: 1.6 + 0.6 * decadesOf(energy),
+            colour: colourOf(energy),
             time: this.seconds,
         };
     }
@@ -127,7 +118,7 @@ export class Sky {
         this.canvas.width = this.canvas.height = size;
         this.exposure.width = this.exposure.height = size;
         this.rewind();
-        if (!this.playing) this.rest();
+        if (!this.clock.playing) this.rest();
     }
 
     /**

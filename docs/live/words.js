@@ -55,10 +55,30 @@ function units(number, [unit, size]) {
  * @throws {RangeError} in words, if it is none
  */
 export function readDepth(text, least, most) {
+    return readMetres(text, least, most, `How deep? From ${least} to ${most} m, such as 13.7.`);
+}
+
+/**
+ * A size of a target that a reader typed, in metres.
+ *
+ * @param {string} text
+ * @throws {RangeError} in words, if it is none
+ */
+export function readSize(text) {
+    return readMetres(text, 0.1, 10, "How large? From 0.1 to 10 m, such as 2.5; deepmuon-gen has no such bounds.");
+}
+
+/**
+ * @param {string} text
+ * @param {number} least
+ * @param {number} most
+ * @param {string} question to who typed something else
+ */
+function readMetres(text, least, most, question) {
     const digits = text.trim().replace(/\s*m$/, "");
-    const depth = /^\d+(\.\d*)?$|^\.\d+$/.test(digits) ? Number(digits) : Number.NaN;
-    if (!(depth >= least && depth <= most)) throw new RangeError(`How deep? From ${least} to ${most} m, such as 13.7.`);
-    return depth;
+    const metres = /^\d+(\.\d*)?$|^\.\d+$/.test(digits) ? Number(digits) : Number.NaN;
+    if (!(metres >= least && metres <= most)) throw new RangeError(question);
+    return metres;
 }
 
 /**

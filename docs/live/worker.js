@@ -2,17 +2,20 @@
 
 import { Generator } from "./generator.js";
 import { Run } from "./run.js";
+import { Aim } from "./target/aim.js";
+import { bodyOf } from "./target/bodies.js";
 
 /** @type {Generator | undefined} */
 let generator;
 /** @type {Run} */
 let run;
+/** @type {Aim | undefined} */
+let aim;
 
 const answers = {
     /** @param {import("./models.js").Model} model */
     async open(model) {
-        const now = generator?.model;
-        if (now?.sha256 === model.sha256 && now.depth_m === model.depth_m) return;
+        if (isOf(generator, model)) return;
         const opened = await Generator.open(model);
         await generator?.close();
         generator = opened;
@@ -31,7 +34,33 @@ const answers = {
 
     /** @param {number} block */
     csv: (block) => run.csv(block),
+
+    /**
+     * The muons per second that hit a body, and some of them.
+     *
+     * @param {import("./models.js").Model} model a family at a depth
+     * @param {import("./target/bodies.js").Kind} kind
+     * @param {number[]} sizes in metres
+     * @param {bigint} seed
+     */
+    async aim(model, kind, sizes, seed) {
+        if (!aim || !isOf(aim.generator, model)) {
+            const opened = await Aim.open(model);
+            await aim?.close();
+            aim = opened;
+        }
+        const body = bodyOf(kind, sizes);
+        return { hz: aim.rate(body), hits: await aim.hits(body, seed) };
+    },
 };
+
+/**
+ * @param {Generator | undefined} generator
+ * @param {import("./models.js").Model} model
+ */
+function isOf(generator, { sha256, depth_m }) {
+    return generator?.model.sha256 === sha256 && generator.model.depth_m === depth_m;
+}
 
 /** @typedef {typeof answers} Answers */
 

@@ -1,8 +1,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { atDepth } from "../../docs/live/family.js";
+import { atDepth, SPHERE } from "../../docs/live/family.js";
 import { depthAlong, familyAt, isFamily, shareOfRange } from "../../docs/live/models.js";
-import { readDepth } from "../../docs/live/words.js";
+import { readDepth, readSize } from "../../docs/live/words.js";
 
 /** @typedef {import("../../docs/live/models.js").Family} Family */
 
@@ -54,6 +54,30 @@ for (const [kind, number] of /** @type {[string, number][]} */ ([
         assert.deepEqual([...atDepth(after.buffer, 10)], [...new Uint8Array(before)]);
     });
 }
+
+for (const [kind, content, expected] of /** @type {[string, number[], number[]][]} */ ([
+    ["raw bytes", field(9, [0, 0, 0, 0]), [1, 0, 0, 0]],
+    ["a packed number", field(5, [0]), [1]],
+])) {
+    test(`a sphere is asked for in the surface, stored as ${kind}`, () => {
+        const depth = field(9, [0, 0, 32, 65]);
+        const before = model([
+            ["depth_m", depth],
+            ["surface", content],
+        ]);
+        const after = model([
+            ["depth_m", depth],
+            ["surface", [...content.slice(0, 2), ...expected]],
+        ]);
+        assert.deepEqual([...atDepth(before, 10, SPHERE)], [...new Uint8Array(after)]);
+        assert.deepEqual([...atDepth(before, 10)], [...new Uint8Array(before)]);
+    });
+}
+
+test("a family without a sphere is told in words", () => {
+    const plane = model([["depth_m", field(9, [0, 0, 32, 65])]]);
+    assert.throws(() => atDepth(plane, 10, SPHERE), /no muons of a sphere/);
+});
 
 test("what is no family is told in words", () => {
     const number = field(9, [0, 0, 32, 65]);
@@ -120,5 +144,12 @@ test("a depth is read in metres, within its range", () => {
     }
     for (const text of ["", "deep", "-1", "100.1", "1e1", "1,5", "NaN"]) {
         assert.throws(() => readDepth(text, 0, 100), /How deep\? From 0 to 100 m/);
+    }
+});
+
+test("a size of a target is read in metres, from a hand's breadth to a house", () => {
+    assert.deepEqual(["4", " 0.1 m ", "10"].map(readSize), [4, 0.1, 10]);
+    for (const text of ["", "0", "-1", "0.09", "10.1", "1e1", "NaN"]) {
+        assert.throws(() => readSize(text), /How large\? From 0.1 to 10 m/);
     }
 });

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import { test } from "node:test";
-import { Latents, modelStream, newSeed, readSeed } from "../../docs/live/latents.js";
+import { FOR_PLACES, Latents, modelStream, newSeed, readSeed } from "../../docs/live/latents.js";
 
 const bytes = await readFile(new URL("../../docs/live/engine/random.wasm", import.meta.url));
 const latents = await Latents.open(bytes);
@@ -10,7 +10,7 @@ test("Philox gives the known answers of Random123", () => {
     const { philox } = /** @type {any} */ (latents.module);
     const words = [0x16554d9eca36314cn, 0xdb20fe9d672d0fdcn, 0xd7e772cee186176bn, 0x7e68b68aec7ba23bn];
     assert.deepEqual(
-        philox(0n, 0n, 0n).map((/** @type {bigint} */ word) => BigInt.asUintN(64, word)),
+        philox(0n, 0n, 0n, 0n).map((/** @type {bigint} */ word) => BigInt.asUintN(64, word)),
         words,
     );
 });
@@ -31,6 +31,11 @@ test("latents are odd multiples of 2^-24 inside (-1, 1), and look uniform", () =
 test("a draw has the same latents wherever the batch begins", () => {
     const long = latents.draw(7n, 5n, 0, 64, 356).slice();
     assert.deepEqual(latents.draw(7n, 5n, 24, 40, 356).slice(), long.slice(24 * 356));
+});
+
+test("what is for places has nothing in common with what is for muons", () => {
+    const ofMuons = new Set(latents.draw(7n, 5n, 0, 64, 3));
+    assert.ok(latents.draw(7n, 5n, 0, 64, 3, FOR_PLACES).every((number) => !ofMuons.has(number)));
 });
 
 test("seeds and streams differ in every bit of theirs", () => {

@@ -66,14 +66,25 @@ async function open(page) {
 
 /**
  * @param {Page} page
- * @param {{depth?: number, architecture?: string, number?: string, seed?: string}} wanted
+ * @param {{depth?: number | string, metres?: number, architecture?: string, number?: string, seed?: string}} wanted
  */
-async function generate(page, { depth, architecture, number = "50000", seed = "" }) {
+async function generate(page, { depth, metres, architecture, number = "50000", seed = "" }) {
     if (depth !== undefined) await page.getByLabel("Depth").selectOption(String(depth));
     if (architecture !== undefined) await page.getByLabel("Architecture").selectOption(architecture);
+    if (metres !== undefined) await page.getByLabel("Metres of water").fill(String(metres));
     await page.getByLabel("Muons", { exact: true }).fill(number);
     await page.getByLabel("Seed").fill(seed);
     await page.getByRole("button", { name: "Generate" }).click();
+}
+
+/**
+ * What has to be chosen for a model, of a family at the depth that it says.
+ *
+ * @param {import("../../../docs/live/models.js").Model} model
+ */
+function choicesOf(model) {
+    const { depth_m, architecture } = model;
+    return isFamily(model) ? { depth: "any", metres: depth_m, architecture } : { depth: depth_m, architecture };
 }
 
 /** @param {Page} page */
@@ -119,7 +130,7 @@ print(json.dumps([column.tolist() for column in columns]))`;
 testPage("every released model gives the muons that the package makes of the same seed", async (page) => {
     const number = 20_000;
     for (const model of released.models) {
-        await generate(page, { depth: model.depth_m, architecture: model.architecture, number: "2e4", seed: "1" });
+        await generate(page, { ...choicesOf(model), number: "2e4", seed: "1" });
         await finished(page);
         const { name, header, muons } = await saveCsv(page);
         assert.equal(name, `muons-${model.architecture}-${model.depth_m}m-seed-1.csv`);
@@ -147,7 +158,7 @@ testPage("the energies fill the spectrum of muons kept out of the training", asy
         released.models.find(({ held_out }) => held_out)
     );
     const held = /** @type {import("../../../docs/live/models.js").Counts} */ (model.held_out).by_energy;
-    await generate(page, { depth: model.depth_m, architecture: model.architecture, number: "2e5", seed: "3" });
+    await generate(page, { ...choicesOf(model), number: "2e5", seed: "3" });
     await finished(page);
     const { muons } = await saveCsv(page);
     const total = held.reduce((sum, count) => sum + count, 0);
@@ -330,18 +341,24 @@ testPage(
     { reducedMotion: "reduce" },
 );
 
+/** @param {Page} page */
+function twoSkies(page) {
+    return twoPictures(page, "#sky");
+}
+
 /**
- * The picture of the sky, and that after ten frames more.
+ * A moving picture, and what it is after ten frames more.
  *
  * @param {Page} page
+ * @param {string} selector
  */
-function twoSkies(page) {
-    return page.evaluate(async () => {
-        const canvas = /** @type {HTMLCanvasElement} */ (document.querySelector("#sky"));
+function twoPictures(page, selector) {
+    return page.evaluate(async (selector) => {
+        const canvas = /** @type {HTMLCanvasElement} */ (document.querySelector(selector));
         const first = canvas.toDataURL();
         for (let i = 0; i < 10; i++) await new Promise(requestAnimationFrame);
         return [first, canvas.toDataURL()];
-    });
+    }, selector);
 }
 
 test("once loaded, the page works without a network, every model too", { timeout: PATIENCE * 5 }, async () => {
@@ -356,8 +373,8 @@ test("once loaded, the page works without a network, every model too", { timeout
         await context.setOffline(true);
         await page.reload();
         await page.locator("#generate:enabled").waitFor();
-        for (const { depth_m, architecture } of released.models) {
-            await generate(page, { depth: depth_m, architecture, number: "1000" });
+        for (const model of released.models) {
+            await generate(page, { ...choicesOf(model), number: "1000" });
             await finished(page);
             assert.equal(await page.locator("#made").innerText(), "1,000");
         }
@@ -418,7 +435,7 @@ content = tiny_family()
 _, model, _ = load_model(*checked_model(content, "family.onnx"), "cpu")
 fields = "name sha256 architecture flux medium surface depth_m depth_min_m depth_max_m muons_per_draw latent_size"
 known = {field: getattr(model, field) for field in f"{fields} energy_min_gev energy_max_gev rate_hz_per_m2".split()}
-known |= {"held_out": None, "rates": [[depth, tiny_rate(depth)] for depth in range(0, 101)]}
+known |= {"has_sphere": True, "held_out": None, "rates": [[depth, tiny_rate(depth)] for depth in range(0, 101)]}
 print(json.dumps({"content": base64.b64encode(content).decode(), "model": known}))`,
         ],
         { encoding: "utf-8", cwd: new URL("../../..", import.meta.url) },
@@ -533,4 +550,235 @@ testPage(
         await finished(page);
     },
     withoutWorkers,
+);
+
+/**
+ * Choose a target.
+ *
+ * @param {Page} page
+ * @param {string} kind
+ * @param {number[]} [sizes] its own where none are given
+ */
+async function choose(page, kind, sizes = []) {
+    await page.getByLabel("Target", { exact: true }).selectOption(kind);
+    for (const [i, size] of sizes.entries()) await page.locator(`#size-${i + 1}`).fill(String(size));
+}
+
+/** @param {Page} page */
+function rateOfTarget(page) {
+    return page.locator("#target-note").getByText("muons a second enter it");
+}
+
+/**
+ * What the worker says of a target.
+ *
+ * @param {Page} page
+ * @param {import("../../../docs/live/models.js").Model} model
+ * @param {string} kind
+ * @param {number[]} sizes
+ * @returns {Promise<{hz: number, hits: number[]}>}
+ */
+function aimOfPage(page, model, kind, sizes) {
+    return page.evaluate(async ([address, model, kind, sizes]) => {
+        const { Engine } = await import(`${address}live/engine.js`);
+        const engine = new Engine();
+        const { hz, hits } = await engine.ask("aim", model, kind, sizes, 7n);
+        engine.close();
+        return { hz, hits: [...hits] };
+    }, /** @type {const} */ ([site.address, model, kind, sizes]));
+}
+
+/**
+ * The same by the package: the rate, and of a sphere, which rejects nothing, the first muons.
+ *
+ * @param {string} open a Python expression for the generator
+ * @param {string} kind
+ * @param {number[]} sizes
+ * @returns {{hz: number, muons: number[][]}}
+ */
+function aimOfPackage(open, kind, sizes) {
+    const program = `
+import json, sys, tempfile, pathlib
+sys.path.insert(0, "tests")
+from support.tiny_families import tiny_family
+from deepmuon_runtime import Generator
+from deepmuon_runtime.targets.by_name import target_of
+with tempfile.TemporaryDirectory() as folder:
+    path = pathlib.Path(folder, "family.onnx")
+    path.write_bytes(tiny_family())
+    generator = ${open}
+    target = target_of("${kind}", ${JSON.stringify(sizes)})
+    muons = generator.sample(1000, seed=7, target=target)
+    columns = (muons.kinetic_energy, muons.u, muons.v, muons.w, muons.x, muons.y, muons.z)
+    rows = list(zip(*(column.tolist() for column in columns)))
+    print(json.dumps({"hz": generator.rate(target=target).hz, "muons": rows}))`;
+    const cwd = new URL("../../..", import.meta.url);
+    return JSON.parse(
+        execFileSync(PYTHON, ["-W", "ignore", "-c", program], { encoding: "utf-8", cwd, maxBuffer: 1e9 }),
+    );
+}
+
+const TARGETS = /** @type {[string, number[]][]} */ ([
+    ["box", [4, 4, 3]],
+    ["cylinder", [0.5, 8]],
+    ["sphere", [2]],
+]);
+
+testPage(
+    "a target has the rate that the package says, and a sphere its muons and where they enter",
+    async (page) => {
+        await openWithFamily(page);
+        const depth = 10;
+        /** @type {[import("../../../docs/live/models.js").Model, string][]} */
+        const families = [[{ ...FAMILY.model, depth_m: depth }, `Generator.open(${depth}, file=path)`]];
+        for (const model of released.models.filter(({ has_sphere }) => has_sphere)) {
+            families.push([
+                { ...model, depth_m: depth },
+                `Generator.open(${depth}, architecture="${model.architecture}")`,
+            ]);
+        }
+        for (const [model, open] of families) {
+            for (const [kind, sizes] of TARGETS) {
+                const { hz, hits } = await aimOfPage(page, model, kind, sizes);
+                const expected = aimOfPackage(open, kind, sizes);
+                assert.ok(Math.abs(hz / expected.hz - 1) < 1e-3, `${model.name}, ${kind}: ${hz}, not ${expected.hz}`);
+                if (kind !== "sphere") continue;
+                for (const [i, [energy, ...rest]] of expected.muons.entries()) {
+                    const [found, ...others] = hits.slice(7 * i, 7 * i + 7);
+                    assert.ok(Math.abs(found / energy - 1) < 1e-4, `${model.name}: energy ${i}`);
+                    for (const [k, number] of rest.entries()) {
+                        assert.ok(Math.abs(others[k] - number) < 1e-4, `${model.name}: muon ${i}`);
+                    }
+                }
+            }
+        }
+    },
+    withoutWorkers,
+);
+
+testPage(
+    "a target is offered where a family is picked, and its rate follows its sizes and the depth",
+    async (page) => {
+        await page.getByLabel("Depth").selectOption("0");
+        assert.ok(await page.getByLabel("Target", { exact: true }).isHidden());
+        await openWithFamily(page);
+        assert.ok(await page.locator("#target-drawing").isHidden());
+        const seen = new Set();
+        for (const [kind, sizes] of TARGETS) {
+            await choose(page, kind, sizes);
+            await page.getByText(`--${kind} ${sizes.join(" ")} --live-time 60`).waitFor();
+            seen.add(await rateOfTarget(page).innerText());
+            const label = `A ${kind} of ${sizes.join(" × ")} m, with points where muons enter it`;
+            assert.ok(await page.getByRole("img", { name: label }).isVisible());
+            assert.equal(await page.locator("#size-3").isVisible(), kind === "box");
+        }
+        await page.getByLabel("Metres of water").fill("80");
+        await rateOfTarget(page).getByText("under 80 m of water").waitFor();
+        seen.add(await rateOfTarget(page).innerText());
+        assert.equal(seen.size, TARGETS.length + 1);
+        await generate(page, {});
+        await finished(page);
+        assert.ok(await rateOfTarget(page).isVisible());
+        await page.getByLabel("Depth").selectOption("10");
+        assert.ok(await page.locator("#target-drawing").isHidden());
+    },
+    withoutWorkers,
+);
+
+testPage(
+    "the muons of a target come one by one, and can be paused by the keyboard",
+    async (page) => {
+        await openWithFamily(page);
+        const choice = page.getByLabel("Target", { exact: true });
+        await choice.focus();
+        await page.keyboard.press("ArrowDown");
+        await rateOfTarget(page).waitFor();
+        const [first, second] = await twoPictures(page, "#target-drawing");
+        assert.notEqual(first, second);
+        for (let i = 0; i < 4; i++) await page.keyboard.press("Tab"); // three sizes, and the button
+        await page.keyboard.press("Space");
+        assert.equal(await page.locator("#target-motion").innerText(), "Play the muons");
+        const [third, fourth] = await twoPictures(page, "#target-drawing");
+        assert.equal(third, fourth);
+        const arrived = await page.evaluate(async (address) => {
+            const { Drawing } = await import(`${address}live/target/drawing.js`);
+            const { bodyOf } = await import(`${address}live/target/bodies.js`);
+            const drawing = new Drawing(document.createElement("canvas"));
+            drawing.clock.playing = true;
+            drawing.show(bodyOf("sphere", [1]), 50, Float32Array.of(1, 0, 0, -1, 0, 0, 1));
+            for (let i = 0; i < 100; i++) drawing.advance(1);
+            return drawing.arrived;
+        }, site.address);
+        assert.ok(Math.abs(arrived - 5000) < 5 * Math.sqrt(5000), `${arrived} in 100 s`); // one in two million fails
+    },
+    withoutWorkers,
+);
+
+testPage(
+    "who asked for less motion sees a target with its muons at rest, and a new one when it changes",
+    async (page) => {
+        await openWithFamily(page);
+        await choose(page, "cylinder");
+        await rateOfTarget(page).waitFor();
+        const [first, second] = await twoPictures(page, "#target-drawing");
+        assert.equal(first, second);
+        await choose(page, "cylinder", [1, 9]);
+        await page.getByText("--cylinder 1 9 ").waitFor();
+        const [third] = await twoPictures(page, "#target-drawing");
+        assert.notEqual(third, first);
+        await page.getByRole("button", { name: "Play the muons" }).click();
+        const [fourth, fifth] = await twoPictures(page, "#target-drawing");
+        assert.notEqual(fourth, fifth);
+    },
+    { ...withoutWorkers, reducedMotion: "reduce" },
+);
+
+testPage(
+    "a size that a target can't have is explained at its field",
+    async (page) => {
+        await openWithFamily(page);
+        await choose(page, "box", [4, 0]);
+        const input = page.getByLabel("Width along y / m");
+        assert.equal(await input.getAttribute("aria-invalid"), "true");
+        assert.match(await page.locator("#target-note").innerText(), /^How large\? From 0.1 to 10 m/);
+        await choose(page, "");
+        assert.ok(await page.locator("#target-note").isHidden());
+        await choose(page, "box", [4, 2]);
+        await rateOfTarget(page).waitFor();
+        assert.equal(await input.getAttribute("aria-invalid"), "false");
+    },
+    withoutWorkers,
+);
+
+testPage(
+    "a family that can't be had is told beside the target, which is there as soon as it can",
+    async (page) => {
+        await openWithFamily(page);
+        const missing = "**/live/models/family.onnx";
+        /** @param {import("playwright-core").Route} route */
+        const refuse = (route) => route.fulfill({ status: 404 });
+        await page.context().route(missing, refuse);
+        await choose(page, "box");
+        await page.locator("#target-note").getByText("could not be fetched: the site answers 404").waitFor();
+        assert.ok(await page.locator("#target-drawing").isHidden());
+        await page.context().unroute(missing, refuse);
+        await choose(page, "box", [3]);
+        await rateOfTarget(page).waitFor();
+    },
+    { ...withoutWorkers, complaints: /404|blocked by Playwright/ },
+);
+
+testPage(
+    "a telephone's width holds a target",
+    async (page) => {
+        await openWithFamily(page);
+        await choose(page, "box");
+        await rateOfTarget(page).waitFor();
+        assert.equal(await page.evaluate(() => document.documentElement.scrollWidth), 360);
+        const box = /** @type {{x: number, width: number}} */ (await page.locator("#target-drawing").boundingBox());
+        assert.ok(box.x >= 0 && box.x + box.width <= 360 && box.width > 250);
+        await page.getByRole("button", { name: "Pause the muons" }).tap();
+        assert.equal(await page.locator("#target-motion").innerText(), "Play the muons");
+    },
+    { ...withoutWorkers, viewport: { width: 360, height: 740 }, isMobile: true, hasTouch: true, deviceScaleFactor: 2 },
 );
