@@ -7,7 +7,7 @@ from deepmuon_runtime import read_attributes
 from deepmuon_runtime.muon_file.check import check_file
 from deepmuon_training.pipeline.step import run_steps
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "models"))
+sys.path.insert(0, str(Path(__file__).parents[3] / "models"))
 from make_measured import sample_steps
 from measured_plan import PLAN, Deep
 
