@@ -130,6 +130,7 @@ class Generator:
         target: Target | None = None,
         live_time: float | None = None,
         area: float | None = None,
+        on_device: bool = False,
     ) -> Muons:
         """Return n muons, or those of a live time, as columns, all in memory.
 
@@ -149,6 +150,9 @@ class Generator:
             Seconds, instead of n: the muons that come in this time, a Poisson number, each with its time.
         area
             With it, the horizontal area in m2 that they cross; a target has its own.
+        on_device
+            Whether the columns are CuPy's arrays in the GPU's memory, of a generator on CUDA. torch and JAX take them
+            without a copy (DLPack). All muons without cuts, target and live time are made there; others come from here.
 
         Returns
         -------
@@ -157,26 +161,13 @@ class Generator:
         Raises
         ------
         RefusedError
-            If n, `first`, their sum or the seed is out of range, the memory does not hold n muons, or there are none
-            of these cuts and this target.
+            If n, `first`, their sum or the seed is out of range, the memory does not hold n muons, there are none
+            of these cuts and this target, or they are to be on a GPU and can't.
         FailedError
             If the model gives an unphysical muon.
         """
         run = self._run(n, seed, first, cuts, target, live_time, area)
-        instead = "take them in chunks, or write a file"
-        count = len(run.numbers)
-        check_memory(count * bytes_per_muon(run.columns), f"{count} muons", instead)
-        try:
-            muons = run.empty(count)
-        except (MemoryError, ValueError) as error:
-            raise RefusedError(f"{count} muons do not fit in memory: {instead}") from error
-
-        def fill(part: range) -> None:
-            run.fill(muons[part.start - run.numbers.start : part.stop - run.numbers.start], part)
-
-        for _ in ordered_map(fill, run.parts(), self.threads, run.stop.set):
-            pass
-        return muons
+        return self._sample_on_device(run) if on_device else self._sample(run)
 
     def chunks(
         self,
@@ -381,6 +372,36 @@ class Generator:
             )
         return Arrivals(rate, seed, selection.source.model.stream, float(live_time))
 
+    def _sample(self, run: _Run) -> Muons:
+        instead = "take them in chunks, or write a file"
+        count = len(run.numbers)
+        check_memory(count * bytes_per_muon(run.columns), f"{count} muons", instead)
+        try:
+            muons = run.empty(count)
+        except (MemoryError, ValueError) as error:
+            raise RefusedError(f"{count} muons do not fit in memory: {instead}") from error
+
+        def fill(part: range) -> None:
+            run.fill(muons[part.start - run.numbers.start : part.stop - run.numbers.start], part)
+
+        for _ in ordered_map(fill, run.parts(), self.threads, run.stop.set):
+            pass
+        return muons
+
+    def _sample_on_device(self, run: _Run) -> Muons:
+        if self.device != "cuda":
+            raise RefusedError("muons can stay on a GPU where they are made there: open the generator on device='cuda'")
+        device = run.selection.source.on_device
+        if device is None:
+            from deepmuon_runtime.cuda.blocks import INSTALL
+
+            raise RefusedError(f"columns in the GPU's memory are CuPy's arrays: {INSTALL}")
+        if run.selection.on_device is None or run.arrivals is not None:
+            return device.copied(self._sample(run))
+        muons = device.empty(len(run.numbers))
+        run.fill(muons, run.numbers)
+        return muons
+
     def _chunks(self, run: _Run) -> collections.abc.Generator[Muons, None, None]:
         def chunk(part: range) -> Muons:
             muons = run.empty(len(part))
@@ -438,7 +459,7 @@ class _Run(NamedTuple):
 
     def empty(self, n: int) -> Muons:
         """Return n muons whose columns are yet to be filled."""
-        return Muons.empty(n, has_place=self.selection.target is not None, has_time=self.arrivals is not None)
+        return self.selection.empty(n, has_time=self.arrivals is not None)
 
     def fill(self, muons: Muons, part: range) -> None:
         """Make some of them."""

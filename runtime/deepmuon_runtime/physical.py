@@ -21,6 +21,7 @@ __all__ = [
     "explain",
     "find_unphysical",
     "first_unphysical",
+    "squared_length_tolerance",
 ]
 
 LOWEST_ENERGY, HIGHEST_ENERGY = 1e-3, 1e5
@@ -89,7 +90,7 @@ def find_unphysical(
     if not len(muons):
         return {}
     low, high = np.float32(energy_min_gev), np.float32(energy_max_gev)
-    tolerance = np.float32(2 * length_tolerance + _ROUNDING_OF_SQUARES)
+    tolerance = squared_length_tolerance(length_tolerance)
     energy, w, pdg_id = muons.kinetic_energy, muons.w, muons.pdg_id
     excess = _excess_length(muons)
     # A NaN makes min and max NaN, and every comparison with NaN is false.
@@ -109,6 +110,11 @@ def find_unphysical(
     if charge_known:
         faults[Fault.CHARGE] = (pdg_id != MU_MINUS) & (pdg_id != MU_PLUS)
     return {fault: bad for fault, bad in faults.items() if bad.any()}
+
+
+def squared_length_tolerance(length_tolerance: float = UNIT_LENGTH_TOLERANCE) -> np.float32:
+    """Return how far the float32 sum of a direction's squares may be from 1, given that of its length."""
+    return np.float32(2 * length_tolerance + _ROUNDING_OF_SQUARES)
 
 
 def _excess_length(muons: Muons) -> NDArray[np.float32]:

@@ -79,8 +79,8 @@ def muon_file(inputs: Inputs, random: Random, folder: Path) -> None:
     whole = folder / "whole.h5"
     inputs.generator.write(whole, 2000, seed=1)
     (folder / "damaged.h5").write_bytes(damage(whole.read_bytes(), random))
-    command, ending = (("check", ""), ("csv", "csv"), ("merge", "h5"), ("plot", "png"))[random.integers(4)]
-    output = ["-o", f"output.{ending}"] if ending else []
+    outputs = {"check": [], "convert": ["output.csv"], "merge": ["-o", "output.h5"], "plot": ["-o", "output.png"]}
+    command, output = list(outputs.items())[random.integers(4)]
     code, err = ended(start(command, ["damaged.h5", *output], folder))
     see(code in (0, 2, 3), f"{command}: exit code {code}, {err!r}")
     see("Traceback" not in err, err)

@@ -41,7 +41,7 @@ class Inputs:
         return [
             ("gen", make),
             ("check", [self.muons]),
-            ("csv", [self.muons, "-o", "output.csv"]),
+            ("convert", [self.muons, "output.csv"]),
             ("merge", [self.muons, "-q", "-o", "output.h5"]),
             ("plot", [self.muons, "-o", "output.png"]),
         ]

@@ -513,10 +513,10 @@ def test_random_bytes_never_end_the_check_by_a_signal_or_without_end(endings, go
     assert found[3] > 50
 
 
-@pytest.mark.parametrize("command", ["check", "csv", "merge", "plot"])
+@pytest.mark.parametrize("command", ["check", "convert", "merge", "plot"])
 def test_a_file_that_another_program_writes_is_refused_with_the_way_on(tmp_path, model_file, command):
     Generator.open(file=model_file).write(tmp_path / "muons.h5", 10, seed=1)
-    output = [] if command == "check" else ["-o", {"csv": "a.csv", "merge": "a.h5", "plot": "a.png"}[command]]
+    output = {"check": [], "convert": ["a.csv"], "merge": ["-o", "a.h5"], "plot": ["-o", "a.png"]}[command]
     asked = [Path(sysconfig.get_path("scripts")) / f"deepmuon-{command}", "muons.h5", *output]
     with h5py.File(tmp_path / "muons.h5", "r+"):
         done = subprocess.run(asked, cwd=tmp_path, capture_output=True, text=True, timeout=120)

@@ -69,8 +69,8 @@ def test_there_and_back_they_are_the_same_muons(convert, tmp_path, name):
     assert convert(f"muons.{name}", "back.h5") == (0, "", "")
     assert check_file(tmp_path / "back.h5").defects == []
     first, second = (read_muons(tmp_path / f"{file}.h5") for file in ("muons", "back"))
-    for column, values in vars(first).items():
-        np.testing.assert_allclose(getattr(second, column), values, rtol=1e-6, atol=1e-6 if "mcpl" in name else 0)
+    for column, values in first.columns.items():
+        np.testing.assert_allclose(second.columns[column], values, rtol=1e-6, atol=1e-6 if "mcpl" in name else 0)
     one, two = (read_attributes(tmp_path / f"{file}.h5") for file in ("muons", "back"))
     assert {**one, "created": ""} == {**two, "created": ""}
 

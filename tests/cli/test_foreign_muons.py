@@ -24,8 +24,8 @@ SEED = 5
 
 ARGUMENTS = {
     "check": ["muons.h5"],
-    "csv": ["muons.h5", "-o", "out.csv"],
-    "csv to stdout": ["muons.h5", "-o", "-"],
+    "convert": ["muons.h5", "out.csv"],
+    "convert to stdout": ["muons.h5", "-"],
     "merge": ["other.h5", "muons.h5", "-o", "out.h5"],
     "virtual merge": ["--virtual", "other.h5", "muons.h5", "-o", "out.h5"],
     "plot": ["muons.h5", "-o", "out.png"],
@@ -103,7 +103,7 @@ def test_each_command_refuses_the_file_in_one_line_and_writes_nothing(folder, co
     assert set(folder.iterdir()) == before
 
 
-@pytest.mark.parametrize("command", ["csv", "csv to stdout", "check", "merge", "virtual merge", "plot"])
+@pytest.mark.parametrize("command", ["convert", "convert to stdout", "check", "merge", "virtual merge", "plot"])
 def test_each_command_takes_files_of_version_1(folder, command):
     for name in ("other.h5", "muons.h5"):
         write_version_1(folder / name, read_muons(folder / name), with_uint64(read_attributes(folder / name)))
@@ -168,7 +168,7 @@ def damage_attributes(muons: h5py.Group, random: np.random.Generator) -> None:
 
 
 @pytest.mark.parametrize("version", [1, 2])
-@pytest.mark.parametrize("command", ["check", "csv", "merge", "virtual merge", "plot"])
+@pytest.mark.parametrize("command", ["check", "convert", "merge", "virtual merge", "plot"])
 def test_no_attribute_of_any_kind_ends_a_command_by_a_traceback(folder, command, version):
     """40 files; signed, where their values can be, so that it is the values that are looked at."""
     if command == "plot":

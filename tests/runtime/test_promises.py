@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from support.tiny_models import tiny_model
 
 from deepmuon_runtime import Generator, Muons, Shard, merge_shards
-from deepmuon_runtime import generator as generator_module
+from deepmuon_runtime.sampling import selection
 
 N, SEED = 400_001, 2**64 - 1
 NOT_PROMISED = ("created", "attributes_crc32")
@@ -55,7 +55,7 @@ def single(model, tmp_path_factory) -> dict[str, Any]:
 @pytest.mark.parametrize("threads", [1, 2, 3])
 @pytest.mark.parametrize("piece", [1, 50_000, 1 << 17])
 def test_a_file_is_the_same_for_any_threads_and_pieces(model, single, tmp_path, monkeypatch, threads, piece):
-    monkeypatch.setitem(generator_module.PIECE, "cpu", piece)
+    monkeypatch.setitem(selection.PIECE, "cpu", piece)
     Generator.open(file=model, threads=threads).write(tmp_path / "muons.h5", N, SEED)
     assert contents(tmp_path / "muons.h5") == single
 

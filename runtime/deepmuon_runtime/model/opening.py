@@ -12,7 +12,7 @@ import onnxruntime
 
 from deepmuon_runtime.errors import RefusedError, first_line
 from deepmuon_runtime.model.contract import INPUT, RATE, check_signature
-from deepmuon_runtime.model.device import open_session
+from deepmuon_runtime.model.device import faster_device, open_session
 from deepmuon_runtime.model.family import at_depth, read_model
 from deepmuon_runtime.model.metadata import RATE_DIGITS, Model, are_one_rate, is_rate
 from deepmuon_runtime.model.onnx_file import check_onnx_file
@@ -92,7 +92,7 @@ def load_model(contents: bytes, model: Model, device: str) -> tuple[onnxruntime.
     RefusedError
         If it breaks the contract, or the device can't be had.
     """
-    session, device = open_session(contents, model.name, device)
+    session, device = open_session(contents, model.name, faster_device(device, model.architecture))
     check_signature(session, model)
     return session, _with_rate(session, model), device
 

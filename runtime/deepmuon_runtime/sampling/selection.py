@@ -6,7 +6,7 @@ import math
 import warnings
 from collections.abc import Callable
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from deepmuon_runtime.cuts import Cuts
 from deepmuon_runtime.errors import RefusedError
@@ -18,6 +18,9 @@ from deepmuon_runtime.sampling.energy_cut import EnergyCut
 from deepmuon_runtime.sampling.integration import Integral, integral
 from deepmuon_runtime.sampling.source import Source
 from deepmuon_runtime.targets.target import Target
+
+if TYPE_CHECKING:
+    from deepmuon_runtime.cuda.blocks import DeviceBlocks
 
 __all__ = ["Rate", "Selection"]
 
@@ -71,7 +74,20 @@ class Selection:
     @property
     def piece(self) -> int:
         """The muons of a task, in whole blocks."""
+        if self.on_device is not None:
+            return self.on_device.muons
         return self._attempts.muons if self.rejects else self._piece
+
+    @cached_property
+    def on_device(self) -> DeviceBlocks | None:
+        """What makes these muons in a GPU's memory; None where they are cut or put on a target, or come from here."""
+        return None if self.cuts or self.target is not None else self.source.on_device
+
+    def empty(self, n: int, *, has_time: bool = False) -> Muons:
+        """Return n muons whose columns are yet to be filled."""
+        if self.on_device is not None and not has_time:
+            return self.on_device.empty_on_host(n)
+        return Muons.empty(n, has_place=self.target is not None, has_time=has_time)
 
     def fill(self, muons: Muons, seed: int, first: int, stopped: Callable[[], object] = _never) -> None:
         """Make the muons from number `first` on.
@@ -92,6 +108,9 @@ class Selection:
         FailedError
             If the model gives an unphysical muon.
         """
+        if self.on_device is not None:
+            self.on_device.fill(muons, seed, first, stopped)
+            return
         size = self._attempts.muons if self.rejects else self.source.block_muons
         done = 0
         while done < len(muons):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import threading
+import warnings
 from collections.abc import Callable
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +19,7 @@ from deepmuon_runtime.physical import check_physical
 if TYPE_CHECKING:
     import onnxruntime
 
+    from deepmuon_runtime.cuda.blocks import DeviceBlocks
     from deepmuon_runtime.model.bound_run import BoundRun
 
 __all__ = ["TRIED", "Source"]
@@ -49,6 +52,19 @@ class Source:
         self.block_draws = _block_draws(model, device)
         self._session = session
         self._own = threading.local()  # each thread's memory for its runs
+
+    @cached_property
+    def on_device(self) -> DeviceBlocks | None:
+        """What makes this model's muons in a GPU's memory alone, where it runs on one and CuPy is installed."""
+        if self.device != "cuda":
+            return None
+        from deepmuon_runtime.cuda.blocks import INSTALL, DeviceBlocks
+        from deepmuon_runtime.model.device import has_cupy
+
+        if not has_cupy():
+            warnings.warn(f"random numbers for the GPU come from the processor, which is slow: {INSTALL}", stacklevel=6)
+            return None
+        return DeviceBlocks(self._session, self.model)
 
     @property
     def block_muons(self) -> int:

@@ -6,7 +6,6 @@ import pytest
 from numpy.typing import NDArray
 from support.tiny_models import tiny_model
 
-from deepmuon_runtime import Generator
 from deepmuon_runtime.latents.philox import latents
 from deepmuon_runtime.model.bound_run import BoundRun
 from deepmuon_runtime.model.contract import INPUT, OUTPUTS
@@ -61,14 +60,3 @@ def test_on_the_cpu_the_muons_of_the_next_run_lie_where_the_last_ones_did(sessio
 def test_a_model_that_makes_another_number_of_muons_writes_none_beyond_its_memory(session, muons):
     with pytest.raises(RuntimeError, match="shape"):
         BoundRun(session, "cpu", DRAWS, 4, muons)()
-
-
-def test_a_generator_gives_the_same_muons_from_the_larger_blocks_of_a_gpu(session, model_file, request):
-    model = Generator.open(file=model_file).model
-    n = 300_000  # more than a block
-    on_cpu = Generator(session, model, "cpu", threads=2).sample(n, seed=3)
-    request.getfixturevalue("memory_of_its_own")
-    on_gpu = Generator(session, model, "cuda", threads=2).sample(n, seed=3)
-    assert np.array_equal(on_gpu.pdg_id, on_cpu.pdg_id)
-    for name in ("kinetic_energy", "u", "v", "w"):
-        np.testing.assert_allclose(getattr(on_gpu, name), getattr(on_cpu, name), rtol=1e-5, atol=1e-6)

@@ -330,7 +330,7 @@ def test_what_a_file_of_version_1_has_beside_its_columns_is_not_looked_at(tmp_pa
 def write_with_places_and_times(path: Path, **attributes: object) -> dict[str, np.ndarray]:
     random = np.random.default_rng(1)
     columns = {
-        **vars(some_muons()),
+        **some_muons().columns,
         **{name: random.uniform(-2, 2, N).astype(np.float32) for name in "xy"},
         "z": np.full(N, 1.5, np.float32),  # the top of a box 3 m high
         "time": np.sort(random.uniform(0, 60, N)),
