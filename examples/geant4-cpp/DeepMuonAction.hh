@@ -6,14 +6,11 @@
 #include <string>
 
 #include "G4Event.hh"
-#include "G4MuonMinus.hh"
-#include "G4MuonPlus.hh"
-#include "G4ParticleGun.hh"
 #include "G4SystemOfUnits.hh"
-#include "G4ThreeVector.hh"
 #include "G4VUserPrimaryGeneratorAction.hh"
 #include "Randomize.hh"
 
+#include "MuonGun.hh"
 #include "deepmuon.hpp"
 
 class DeepMuonAction : public G4VUserPrimaryGeneratorAction {
@@ -29,16 +26,8 @@ public:
     void GeneratePrimaries(G4Event* event) override {
         const auto random = [] { return static_cast<std::uint32_t>(G4UniformRand() * 0x1p32); };
         const deepmuon::Muon muon = generator_.sample(1, random).front();
-        if (muon.charge > 0) {
-            gun_.SetParticleDefinition(G4MuonPlus::Definition());
-        } else {
-            gun_.SetParticleDefinition(G4MuonMinus::Definition());
-        }
-        gun_.SetParticleEnergy(muon.kinetic_energy * GeV);
-        gun_.SetParticleMomentumDirection(G4ThreeVector(muon.u, muon.v, muon.w));
         const G4double x = (G4UniformRand() - 0.5) * side_, y = (G4UniformRand() - 0.5) * side_;
-        gun_.SetParticlePosition(G4ThreeVector(x, y, z_));
-        gun_.GeneratePrimaryVertex(event);
+        gun_.Shoot(event, muon.charge > 0, muon.kinetic_energy * GeV, {muon.u, muon.v, muon.w}, {x, y, z_});
     }
 
     // The time in which so many muons come through the square, on average.
@@ -49,6 +38,6 @@ public:
 
 private:
     deepmuon::Generator generator_;
-    G4ParticleGun gun_{1};
+    MuonGun gun_;
     G4double side_, z_;
 };

@@ -7,20 +7,17 @@
 
 #include "FTFP_BERT.hh"
 #include "G4Box.hh"
-#include "G4Event.hh"
 #include "G4LogicalVolume.hh"
 #include "G4NistManager.hh"
 #include "G4PVPlacement.hh"
 #include "G4RunManager.hh"
 #include "G4RunManagerFactory.hh"
-#include "G4Step.hh"
 #include "G4SystemOfUnits.hh"
-#include "G4UserEventAction.hh"
-#include "G4UserSteppingAction.hh"
 #include "G4VUserActionInitialization.hh"
 #include "G4VUserDetectorConstruction.hh"
 
 #include "DeepMuonAction.hh"
+#include "Deposits.hh"
 
 class Plate : public G4VUserDetectorConstruction {
     G4VPhysicalVolume* Construct() override {
@@ -34,36 +31,6 @@ class Plate : public G4VUserDetectorConstruction {
     }
 };
 
-// Sums up the energy that each event leaves in the plate.
-class Deposits : public G4UserEventAction {
-public:
-    void BeginOfEventAction(const G4Event*) override { deposit_ = 0; }
-    void Add(G4double energy) { deposit_ += energy; }
-    void EndOfEventAction(const G4Event*) override {
-        hits += deposit_ > 0;
-        sum += deposit_;
-    }
-
-    inline static G4int hits = 0;
-    inline static G4double sum = 0;
-
-private:
-    G4double deposit_ = 0;
-};
-
-class Steps : public G4UserSteppingAction {
-public:
-    explicit Steps(Deposits& deposits) : deposits_(deposits) {}
-    void UserSteppingAction(const G4Step* step) override {
-        if (step->GetPreStepPoint()->GetPhysicalVolume()->GetName() == "plate") {
-            deposits_.Add(step->GetTotalEnergyDeposit());
-        }
-    }
-
-private:
-    Deposits& deposits_;
-};
-
 class Actions : public G4VUserActionInitialization {
 public:
     Actions(const std::string& model, std::optional<float> depth) : model_(model), depth_(depth) {}
@@ -72,7 +39,7 @@ public:
                              : new DeepMuonAction(model_, 20 * m, 1 * m));
         auto* deposits = new Deposits;
         SetUserAction(deposits);
-        SetUserAction(new Steps(*deposits));
+        SetUserAction(new Steps(*deposits, "plate"));
     }
 
 private:

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import geant4_pybind as g4
 import numpy as np
+from volumes import Volumes
 
 from deepmuon_runtime import Generator, Muons
 from deepmuon_training.transport.geant4_physics import MuonPhysics, NoSecondaries, initialize
@@ -82,13 +83,12 @@ class Actions(g4.G4VUserActionInitialization):
         self.SetUserAction(self.no_secondaries)
 
 
-class Block(g4.G4VUserDetectorConstruction):
+class Block(Volumes):
     """The block in a sensitive vacuum, which sees what leaves it."""
 
     def __init__(self, scene: Scene, exits: ExitRecorder) -> None:
         super().__init__()
         self.scene, self.exits = scene, exits
-        self.kept: list[object] = []  # from Python's garbage collection: Geant4 holds bare pointers
 
     def Construct(self) -> g4.G4VPhysicalVolume:  # noqa: N802
         """Build it; Geant4 calls this."""
@@ -99,15 +99,6 @@ class Block(g4.G4VUserDetectorConstruction):
         if self.scene.radius:
             self.place(g4.G4Orb("sphere", self.scene.radius * g4.m), "G4_Pb", block)
         return world
-
-    def place(self, solid: g4.G4VSolid, material: str, mother: g4.G4VPhysicalVolume | None) -> g4.G4VPhysicalVolume:
-        """Put a solid of a material into the middle of its mother volume."""
-        name, matter = solid.GetName(), g4.G4NistManager.Instance().FindOrBuildMaterial(material)
-        logical = g4.G4LogicalVolume(solid, matter, name)
-        outside = mother.GetLogicalVolume() if mother else None
-        placed = g4.G4PVPlacement(None, g4.G4ThreeVector(), logical, name, outside, False, 0)
-        self.kept += [logical, placed]
-        return placed
 
     def ConstructSDandField(self) -> None:  # noqa: N802
         """Make the vacuum sensitive; Geant4 calls this."""

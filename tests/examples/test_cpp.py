@@ -14,10 +14,11 @@ from pathlib import Path
 import numpy as np
 import onnx
 import pytest
+from support.analytic_family import MEAN_COS, MEAN_SIN, SPHERE_RATE, analytic_family
 from support.engines import MODELS as RELEASED
 from support.tiny_families import tiny_family
 
-from deepmuon_runtime import Generator, read_muons
+from deepmuon_runtime import Box, Generator, read_muons
 from deepmuon_runtime.model.baking import bake
 
 REPOSITORY = Path(__file__).parents[2]
@@ -199,6 +200,56 @@ def test_the_rate_of_a_family_goes_with_its_depth(readme: tuple[Path, str], tmp_
     shell(build[build.index("cmake -B") : build.index("build/my-muons")], tmp_path)
     found = subprocess.run([tmp_path / "build" / "rate", family_file], stdout=subprocess.PIPE, text=True, check=True)
     assert [float(word) for word in found.stdout.split()] == pytest.approx([82.6, 90], rel=1e-5)
+
+
+@needs_openvino
+def test_muons_enter_a_box_as_often_and_where_they_should(tmp_path: Path):
+    (tmp_path / "family.onnx").write_bytes(analytic_family())
+    sphere = onnx.load_model_from_string(analytic_family({"surface": "1"}))
+    (surface,) = (tensor for tensor in sphere.graph.initializer if tensor.name == "surface")
+    surface.CopyFrom(onnx.numpy_helper.from_array(np.int32(1), "surface"))
+    onnx.save(sphere, tmp_path / "sphere.onnx")
+    (tmp_path / "enter.cpp").write_text(
+        """#include <cstdio>
+        #include "box.hpp"
+        #include "deepmuon.hpp"
+        int main(int, char** words) {
+            deepmuon::Generator generator(words[1]);
+            const deepmuon::Box box(0.4, 0.2, 0.3);
+            auto latents = generator.random(1), numbers = generator.random(2);
+            for (const auto& muon : generator.sample(200000, latents)) {
+                if (const auto entry = box.enter(muon, [&] { return numbers() * 0x1p-32; })) {
+                    std::printf("%.9g,%.9g,%.9g,", entry->x, entry->y, entry->z);
+                    std::printf("%.9g,%.9g,%.9g\\n", muon.u, muon.v, muon.w);
+                }
+            }
+            std::printf("%.9g,0,0,0,0,0\\n", box.largest_area());
+        }"""
+    )
+    (tmp_path / "CMakeLists.txt").write_text(
+        f"""cmake_minimum_required(VERSION 3.21)
+        project(enter CXX)
+        add_subdirectory({REPOSITORY / "examples" / "cpp"} deepmuon)
+        add_executable(enter enter.cpp)
+        target_link_libraries(enter PRIVATE deepmuon)"""
+    )
+    _, build = blocks(EMBEDDING, "sh")
+    shell(build[build.index("cmake -B") : build.index("build/my-muons")], tmp_path)
+    command = [tmp_path / "build" / "enter", tmp_path / "sphere.onnx"]
+    written = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
+    rows = np.array([line.split(",") for line in written.splitlines()], dtype=float)
+    (x, y, z, u, v, w), largest = rows[:-1].T, rows[-1, 0]
+    assert Box(0.4, 0.2, 0.3).touches(x, y, z, u, v, w).all()
+    across = MEAN_SIN * 2 / np.pi
+    areas = {"top": 0.08 * MEAN_COS, "x": 0.06 * across, "y": 0.12 * across}
+    # Binomial numbers of 200,000 tries, five standard deviations: a false alarm in a million runs.
+    counts = {"top": np.sum(z == 0.15), "x": np.sum(np.abs(x) == 0.2), "y": np.sum(np.abs(y) == 0.1)}
+    for face, area in areas.items():
+        share = area / largest
+        assert abs(counts[face] - 200_000 * share) < 5 * np.sqrt(200_000 * share * (1 - share))
+    rate = Generator.open(file=tmp_path / "family.onnx").rate(target=Box(0.4, 0.2, 0.3))
+    assert rate is not None
+    assert rate.hz == pytest.approx(SPHERE_RATE * sum(areas.values()), rel=1e-3)
 
 
 @needs_openvino

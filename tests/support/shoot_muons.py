@@ -10,7 +10,7 @@ from pathlib import Path
 
 import geant4_pybind as g4
 
-from deepmuon_runtime import Generator
+from deepmuon_runtime import Generator, Plane
 from deepmuon_training.transport.geant4_physics import MuonPhysics, initialize
 from deepmuon_training.transport.geant4_source import MuonSource
 
@@ -70,5 +70,10 @@ if __name__ == "__main__":
         result.append({"shot": source.shot, "rows": notes.rows})
         notes.rows = []
         source.load(generator.sample(number, seed))
+    source.load(generator.sample(1, seed, target=Plane(1, 1)))
+    try:
+        manager.BeamOn(1)
+    except ValueError as error:
+        result.append({"refused": str(error)})
     Path(sys.argv[6]).write_text(json.dumps(result))
     os._exit(0)  # the interpreter may crash while it takes Geant4 down
