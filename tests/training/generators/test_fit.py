@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from deepmuon_runtime import Generator
 from deepmuon_runtime.errors import RefusedError
@@ -256,3 +257,11 @@ def test_a_width_that_is_no_multiple_of_eight_is_refused(d):
 def test_a_batch_smaller_than_one_draw_is_refused():
     with pytest.raises(RefusedError, match="a batch of 512 muons is less than one draw of 1024"):
         TransformerSettings(d=1024, batch=512)
+
+
+def test_a_quantile_fit_is_the_same_for_any_number_of_threads(few, tmp_path, monkeypatch):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    for threads in (1, 2):
+        with threadpool_limits(limits=threads):
+            fit_generator(few, "quantile", seed=3, progress=False).save(tmp_path / f"{threads}.pt")
+    assert digest(tmp_path / "1.pt") == digest(tmp_path / "2.pt")
