@@ -43,7 +43,6 @@ class DeviceRun:
         self._cupy = cupy
         self._session = session
         self._model = model
-        self._draws = draws
         n = draws * model.muons_per_draw
         self._latent = cupy.empty((draws, model.latent_size), np.float32)
         self._outputs = (cupy.empty(n, np.float32), cupy.empty((n, 3), np.float32), cupy.empty(n, np.int8))

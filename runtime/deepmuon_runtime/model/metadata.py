@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -161,7 +162,7 @@ class Model:
             least, depth, most = np.array([self.depth_min_m, depth_m, self.depth_max_m], np.float32)
         return bool(least <= depth <= most)
 
-    @property
+    @cached_property
     def stream(self) -> int:
         """The stream of random numbers that makes its muons, 0 to 2^64 - 1."""
         return model_stream(self.architecture, self.flux, self.medium, self.surface, self.depth_m)
