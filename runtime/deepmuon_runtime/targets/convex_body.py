@@ -8,7 +8,7 @@ from abc import abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from deepmuon_runtime.targets.sphere import disc
+from deepmuon_runtime.targets.sphere import entry
 from deepmuon_runtime.targets.target import TOLERANCE, Array, Entries, Target, checked_sizes
 
 __all__ = ["ConvexBody"]
@@ -106,9 +106,7 @@ class ConvexBody(Target):
         """Throw muons at the disc of the sphere, and see which lines meet the body."""
         checked_sizes(f"a {self.name}", radius=self.radius)
         u, v, w, numbers = (part.astype(np.float64) for part in (u, v, w, numbers))
-        x, y, z = (self.radius * part for part in disc(u, v, w, numbers))
-        back = np.sqrt(np.maximum(0.0, self.radius**2 - (x * x + y * y + z * z)))
-        x, y, z = x - back * u, y - back * v, z - back * w
+        x, y, z = (self.radius * part for part in entry(u, v, w, numbers))
         with np.errstate(invalid="ignore", divide="ignore"):
             path = np.asarray(self.path(x, y, z, u, v, w), np.float64)
         hits = np.isfinite(path)

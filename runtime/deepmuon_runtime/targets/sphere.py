@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from deepmuon_runtime.targets.target import TOLERANCE, Array, Entries, Target, checked_sizes
 
-__all__ = ["Sphere", "disc"]
+__all__ = ["Sphere", "entry"]
 
 
 @dataclass(frozen=True)
@@ -58,16 +58,22 @@ class Sphere(Target):
 
     def enters(self, u: Array, v: Array, w: Array, numbers: Array) -> Entries:
         """Put all muons on it, uniform on the disc across their directions."""
-        x, y, z = disc(u, v, w, numbers)
-        back = np.sqrt(np.maximum(np.float32(0), np.float32(1) - (x * x + y * y + z * z)))
         radius = np.float32(self.radius)
-        return Entries(np.ones(len(w), bool), radius * (x - back * u), radius * (y - back * v), radius * (z - back * w))
+        x, y, z = (radius * part for part in entry(u, v, w, numbers))
+        return Entries(np.ones(len(w), bool), x, y, z)
 
     def touches(self, x: Array, y: Array, z: Array, u: Array, v: Array, w: Array) -> NDArray[np.bool_]:
         """Tell whether places are on the half that muons come in by."""
         near = TOLERANCE * self.radius
         is_on = np.abs(np.sqrt(x * x + y * y + z * z) - self.radius) <= near
         return np.asarray(is_on & (x * u + y * v + z * w <= near))
+
+
+def entry(u: Array, v: Array, w: Array, numbers: Array) -> tuple[Array, Array, Array]:
+    """Return where muons enter the unit sphere, uniform on its shadow; the parameters are those of `disc`."""
+    x, y, z = disc(u, v, w, numbers)
+    back = np.sqrt(np.maximum(np.float32(0), np.float32(1) - (x * x + y * y + z * z)))
+    return x - back * u, y - back * v, z - back * w
 
 
 def disc(u: Array, v: Array, w: Array, numbers: Array) -> tuple[Array, Array, Array]:
