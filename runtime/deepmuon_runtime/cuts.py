@@ -101,11 +101,10 @@ class Cuts:
             How far energies and cos zenith may be from what they were, relative.
         """
         kept = np.ones(len(muons), bool)
-        for column, (low, high) in ((muons.kinetic_energy, self.energies), (muons.cos_zenith, self.cos_zeniths)):
-            if low > 0:
-                kept &= column >= low * np.float32(1 - rounding)
-            if high < np.inf:
-                kept &= column <= high * np.float32(1 + rounding)
+        if self.cut_energy:
+            _cut(kept, muons.kinetic_energy, self.energies, rounding)
+        if self.cut_zenith:
+            _cut(kept, muons.cos_zenith, self.cos_zeniths, rounding)
         return kept
 
     @property
@@ -118,6 +117,17 @@ class Cuts:
             "zenith_max_degrees": self.zenith_max,
         }
         return {name: float(bound) for name, bound in named.items() if bound is not None}
+
+
+def _cut(
+    kept: NDArray[np.bool_], column: NDArray[np.float32], bounds: tuple[np.float32, np.float32], rounding: float
+) -> None:
+    """Take out what is outside the bounds."""
+    low, high = bounds
+    if low > 0:
+        kept &= column >= low * np.float32(1 - rounding)
+    if high < np.inf:
+        kept &= column <= high * np.float32(1 + rounding)
 
 
 def _inward(low: float, high: float) -> tuple[np.float32, np.float32]:
