@@ -4,7 +4,8 @@ python -m studies.families.depths EVALUATIONS FAMILY
 
 EVALUATIONS is a folder of them, DEPTHm.json and DEPTHm-sphere.json, as models/make_family.py leaves it; FAMILY the ONNX
 file. Rate and mean energy are asked of the family at 100 depths, of the same latents at each; their second differences
-in s = ln(z + 0.7 m), the coordinate in which it interpolates, would show a kink as a peak.
+in s = ln(density z + 0.7 m), the coordinate in which it interpolates, would show a kink as a peak. Writes FAMILY.json,
+FAMILY.md and FAMILY.png beside itself.
 """
 
 from __future__ import annotations
@@ -22,16 +23,18 @@ from onnxruntime import InferenceSession
 
 from deepmuon_runtime.latents.philox import latents
 from deepmuon_runtime.model.family import at_depth, read_model
+from deepmuon_runtime.model.metadata import Model
 from deepmuon_training.families.knots import OFFSET
 from deepmuon_training.reports.pictures import STYLE
 from deepmuon_training.scores.evaluation import Evaluation
 from deepmuon_training.scores.histograms import compare_horizon
+from deepmuon_training.underground.overburden import OVERBURDENS
 from studies.shared.report import COLOURS, write
 
 SEED = 1
 DEPTHS = 100
-AT_KNOTS, BETWEEN = 0.8, 1.2
-"""Largest delta [%] that is wanted."""
+WANTED = {"cry": (0.8, 1.2), "measured": (1.0, 1.5)}
+"""Largest delta [%] of each flux, at knots and between."""
 
 Float = NDArray[np.float64]
 
@@ -46,9 +49,13 @@ def main(evaluations: Path, family: Path, knots: str, number: int) -> None:
     known = {float(knot) for knot in knots.split(",")}
     scored = [Scored.read(path, known) for path in evaluations.glob("*m*.json")]
     scored.sort(key=lambda one: (one.surface, one.depth_m))
-    curve = smoothness(family, number)
+    contents = family.read_bytes()
+    model = read_model(contents, str(family))
+    density = OVERBURDENS[model.medium].density
+    curve = smoothness(contents, model, density, number)
     numbers = {"family": family.name, "scores": [vars(one) for one in scored], "muons": number, "curve": curve}
-    write(Path(__file__), numbers, [HEAD, *(one.row() for one in scored)], draw(scored, curve))
+    figure = draw(scored, curve, density, WANTED[str(model.flux)])
+    write(Path(__file__).with_name(f"{family.stem}.py"), numbers, [HEAD, *(one.row() for one in scored)], figure)
 
 
 HEAD = ("depth / m", "", "through a", "delta / %", "KS energy", "KS cos zenith", "charge", "below cos 0.05", "rate")
@@ -105,14 +112,12 @@ class Scored:
         ]
 
 
-def smoothness(family: Path, number: int) -> dict[str, Any]:
+def smoothness(contents: bytes, model: Model, density: float, number: int) -> dict[str, Any]:
     """Find rate and mean ln E at many depths, and their second differences, of the same latents at each."""
-    contents = family.read_bytes()
-    model = read_model(contents, str(family))
     assert model.depth_min_m is not None
     assert model.depth_max_m is not None
-    s = np.linspace(np.log(model.depth_min_m + OFFSET), np.log(model.depth_max_m + OFFSET), DEPTHS)
-    depths = np.clip(np.exp(s) - OFFSET, model.depth_min_m, model.depth_max_m)
+    s = np.linspace(*(np.log(density * depth + OFFSET) for depth in (model.depth_min_m, model.depth_max_m)), DEPTHS)
+    depths = np.clip((np.exp(s) - OFFSET) / density, model.depth_min_m, model.depth_max_m)
     latent = latents(seed=SEED, first=0, draws=number, latent_size=model.latent_size)
     rate, energy = [], []
     for depth in depths.tolist():
@@ -130,7 +135,7 @@ def smoothness(family: Path, number: int) -> dict[str, Any]:
     }
 
 
-def draw(scored: list[Scored], curve: dict[str, Any]) -> Figure:
+def draw(scored: list[Scored], curve: dict[str, Any], density: float, wanted: tuple[float, float]) -> Figure:
     """Draw delta, rate and mean energy, and second differences, against depth."""
     with rc_context(STYLE):
         figure = Figure(figsize=(7, 9), layout="constrained")
@@ -139,20 +144,20 @@ def draw(scored: list[Scored], curve: dict[str, Any]) -> Figure:
             for knot, colour in ((True, COLOURS[0]), (False, COLOURS[1])):
                 some = [one for one in scored if (one.surface, one.knot) == (surface, knot)]
                 name = f"{'at knots' if knot else 'between'}, {('plane', 'sphere')[surface]}"
-                places, values = [one.depth_m + OFFSET for one in some], [one.delta for one in some]
+                places, values = [density * one.depth_m + OFFSET for one in some], [one.delta for one in some]
                 delta.errorbar(places, values, [one.delta_noise for one in some], fmt=marker, color=colour, label=name)
-        for limit, colour in ((AT_KNOTS, COLOURS[0]), (BETWEEN, COLOURS[1])):
+        for limit, colour in zip(wanted, COLOURS, strict=False):
             delta.axhline(limit, color=colour, ls=":")
         delta.set(ylabel="δ / %", ylim=(0, None))
         delta.legend(frameon=False, ncols=2)
-        places = np.array(curve["depth_m"]) + OFFSET
+        places = density * np.array(curve["depth_m"]) + OFFSET
         rate.plot(places, np.exp(curve["ln_rate"]), color=COLOURS[0], label="rate / (1/m² s)")
         rate.plot(places, np.exp(curve["mean_ln_energy"]), color=COLOURS[2], label="exp(mean of ln E/GeV)")
         rate.set(yscale="log")
         rate.legend(frameon=False)
         second.plot(places[1:-1], curve["second_difference_of_ln_rate"], color=COLOURS[0], label="of ln rate")
         second.plot(places[1:-1], curve["second_difference_of_mean_ln_energy"], color=COLOURS[2], label="of mean ln E")
-        second.set(xscale="log", xlabel="depth + 0.7 m of water / m", ylabel="second derivative in ln(z + 0.7 m)")
+        second.set(xscale="log", xlabel="depth + 0.7 / m w.e.", ylabel="second derivative in its logarithm")
         second.legend(frameon=False)
     return figure
 

@@ -29,14 +29,14 @@ class Target:
 
 TARGETS: dict[str, tuple[Target, ...]] = {
     "quantile": (
-        Target("KS *", "excess", 0.001),
+        Target("KS *", "excess", 0.0007),
         Target("cells*: delta", "excess", 0.012),
         Target("energy bin*", "excess", 0.015),
         Target("cos zenith bin*", "excess", 0.015),
-        Target("cos zenith *", "excess", 0.05),
-        Target("tail above *", "excess", 0.05),
-        Target("tail below *", "excess", 0.05),
-        Target("charge by cell*", "excess", 0.5),
+        Target("cos zenith 0 to 0.05", "excess", 0.3),
+        Target("cos zenith *", "excess", 0.1),
+        Target("tail *", "excess", 0.03),
+        Target("charge by cell*", "excess", 0.2),
         Target("charge ratio", "excess", 0.005),
         Target("azimuth*", "excess", 0.5),
         Target("classifier*", "excess", 0.003),
