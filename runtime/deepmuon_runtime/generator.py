@@ -432,6 +432,8 @@ class Generator:
             "architecture": model.architecture,
             "device": self.device,
         }
+        if "flux" in model.metadata:
+            said["flux"] = model.flux
         if model.surface == SPHERE:
             said["surface"] = SPHERE
         if selection.cuts:
