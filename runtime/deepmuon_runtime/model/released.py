@@ -190,7 +190,7 @@ def _depths(models: list[Model]) -> dict[str, str]:
 
 def _printable(name: object) -> str:
     """Return what a user calls a flux or a medium, as it can stand in a line."""
-    return name if isinstance(name, str) and is_name(name) else shown(repr(name))
+    return shown(name if isinstance(name, str) and is_name(name) else repr(name))
 
 
 def _there_are(names: list[str]) -> str:

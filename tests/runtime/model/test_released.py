@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from deepmuon_runtime import Generator, RefusedError, list_models
-from deepmuon_runtime.model.released import default_architecture, serving_models
+from deepmuon_runtime.model.released import default_architecture, released_model, serving_models
 
 
 @pytest.mark.usefixtures("released")
@@ -142,6 +144,18 @@ DEPTHS = "cry in water has 0 to 100 m; measured in water has 0 to 5000 m; measur
 def test_a_flux_a_medium_or_a_depth_that_is_lacking_is_refused_with_what_there_is(depth, chosen, reason):
     with pytest.raises(RefusedError, match=f"^{re.escape(reason)}$"):
         Generator.open(depth, **chosen)
+
+
+@pytest.mark.usefixtures("released_families")
+@settings(deadline=None, max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(flux=st.none() | st.text(), medium=st.none() | st.text(), depth=st.floats())
+def test_whatever_is_asked_for_is_found_or_refused_in_one_line(flux, medium, depth):
+    try:
+        assert released_model(depth, flux=flux, medium=medium).has_depth(depth)
+    except RefusedError as refused:
+        text = str(refused)
+        assert text.isprintable()
+        assert "measured in rock" in text
 
 
 @pytest.mark.usefixtures("released_families")
