@@ -51,11 +51,13 @@ class RootWriter(Writer):
         self._checksums = dict.fromkeys(self._types, 0)
         self._waiting: list[Columns] = []
         self._waiting_count = 0
+        self._flushed = 0
 
     def _append(self, columns: Columns) -> None:
         for name, values in columns.items():
             self._checksums[name] = crc32(values.data, self._checksums[name])
-        self._waiting.append(columns)
+        # Copies: whoever gave the columns may fill their memory again.
+        self._waiting.append({name: columns[name].astype(_in_tree(dtype)) for name, dtype in self._types.items()})
         self._waiting_count += len(columns["pdg_id"])
         if self._waiting_count >= BASKET:
             self._extend()
@@ -73,16 +75,9 @@ class RootWriter(Writer):
             return
         waiting, self._waiting = self._waiting, []
         self._waiting_count = 0
-        self._tree.extend(
-            {
-                name: np.concatenate([columns[name] for columns in waiting]).astype(_in_tree(dtype), copy=False)
-                for name, dtype in self._types.items()
-            }
-        )
+        self._tree.extend({name: np.concatenate([columns[name] for columns in waiting]) for name in self._types})
         self._flush.wrote(os.fstat(self._file.fileno()).st_size - self._flushed)
         self._flushed = os.fstat(self._file.fileno()).st_size
-
-    _flushed = 0
 
 
 class _Kept:

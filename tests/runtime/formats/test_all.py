@@ -128,6 +128,18 @@ def test_what_a_generator_writes_is_good_in_every_format(tmp_path, model_file, n
     assert report.attributes == {**expected.attributes, "created": report.attributes["created"]}
 
 
+@FORMS
+def test_memory_whose_muons_were_written_may_be_filled_again(tmp_path, name):
+    columns = some_columns(3000, ("x", "y", "z", "time"))
+    path, memory = tmp_path / f"muons.{name}", {key: np.empty(1000, values.dtype) for key, values in columns.items()}
+    with output_format(path).writer(path, ABOUT, optional=("x", "y", "z", "time")) as writer:
+        for first in range(0, 3000, 1000):
+            for key, values in columns.items():
+                memory[key][:] = values[first : first + 1000]
+            writer.append_columns(memory)
+    assert_same(read(path)[1], columns, rounded="mcpl" in name)
+
+
 @settings(deadline=None, max_examples=30)
 @given(
     st.sampled_from(["mcpl", "mcpl.gz", "csv", "csv.gz"]),
