@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -108,23 +108,29 @@ def opened_root(path: str | Path) -> Iterator[Source]:
     """
     import uproot
 
-    with _errors(path), uproot.open(path) as file:
-        names = file.keys(cycle=False)
-        if TREE not in names or TEXT not in names:
-            raise RefusedError(
-                f"{path} was not written by DeepMuon: it lacks the tree {TREE} or the text {TEXT} (deepmuon-train "
-                "convert reads others)"
-            )
-        stated = json.loads(str(file[TEXT]))
-        if not isinstance(stated, dict):
-            raise RefusedError(f"{path} is damaged: its text {TEXT} is none of ours")
-        attributes, more = understood(stated, path)
-        types, tree = column_types(more.get(COLUMN_NAMES), path), file[TREE]
-        if tree.num_entries != attributes["count"]:
-            raise RefusedError(f"{path} has {tree.num_entries} muons, and says that it has {attributes['count']}")
-        if tree.typenames() != {name: _TYPES[_in_tree(dtype).str[1:]] for name, dtype in types.items()}:
-            raise RefusedError(f"{path} is damaged: its branches are {tree.typenames()}")
-        yield Source(attributes, tuple(types), lambda: _pieces(path, tree, types, more.get(CHECKSUM)))
+    with ExitStack() as stack:
+        with _errors(path):  # not around what is made of the muons, whose errors are none of this file
+            source = _source(stack.enter_context(uproot.open(path)), path)
+        yield source
+
+
+def _source(file: Any, path: str | Path) -> Source:
+    names = file.keys(cycle=False)
+    if TREE not in names or TEXT not in names:
+        raise RefusedError(
+            f"{path} was not written by DeepMuon: it lacks the tree {TREE} or the text {TEXT} (deepmuon-train "
+            "convert reads others)"
+        )
+    stated = json.loads(str(file[TEXT]))
+    if not isinstance(stated, dict):
+        raise RefusedError(f"{path} is damaged: its text {TEXT} is none of ours")
+    attributes, more = understood(stated, path)
+    types, tree = column_types(more.get(COLUMN_NAMES), path), file[TREE]
+    if tree.num_entries != attributes["count"]:
+        raise RefusedError(f"{path} has {tree.num_entries} muons, and says that it has {attributes['count']}")
+    if tree.typenames() != {name: _TYPES[_in_tree(dtype).str[1:]] for name, dtype in types.items()}:
+        raise RefusedError(f"{path} is damaged: its branches are {tree.typenames()}")
+    return Source(attributes, tuple(types), lambda: _pieces(path, tree, types, more.get(CHECKSUM)))
 
 
 _TYPES = {"f4": "float", "f8": "double", "i4": "int32_t"}
