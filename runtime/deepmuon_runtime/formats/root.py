@@ -46,6 +46,7 @@ class RootWriter(Writer):
     def _begin(self) -> None:
         import uproot
 
+        said(self._description.of(0))  # what can't be said is refused now, and not at the end
         self._root = uproot.recreate(_Kept(self._file), compression=None)  # random numbers hardly shrink
         self._tree = self._root.mktree(TREE, {name: _in_tree(dtype) for name, dtype in self._types.items()})
         self._checksums = dict.fromkeys(self._types, 0)

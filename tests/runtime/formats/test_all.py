@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from deepmuon_cli.options.formats import FORMATS as NAMES
-from deepmuon_runtime import Generator, RefusedError, check_file, convert_file
+from deepmuon_runtime import Generator, Muons, RefusedError, check_file, convert_file, write_muons
 from deepmuon_runtime.files.partial import PARTIAL_SUFFIX
 from deepmuon_runtime.formats.registry import FORMATS, format_of, opened_muons, output_format
 from deepmuon_runtime.muon_file.format import COLUMNS, OPTIONAL_COLUMNS
@@ -138,6 +138,28 @@ def test_memory_whose_muons_were_written_may_be_filled_again(tmp_path, name):
                 memory[key][:] = values[first : first + 1000]
             writer.append_columns(memory)
     assert_same(read(path)[1], columns, rounded="mcpl" in name)
+
+
+@FORMS
+@pytest.mark.parametrize("attribute", ["a = b", "two\nlines", "columns", "crc32", "format"])
+def test_an_attribute_that_would_not_be_read_back_is_refused_before_anything_is_written(tmp_path, name, attribute):
+    write_muons(tmp_path / "muons.h5", Muons.empty(0), {"depth_m": 1.0, "medium": "rock", attribute: "kept"})
+    path = tmp_path / f"other.{name}"
+    if name == "h5":
+        convert_file(tmp_path / "muons.h5", path)
+        assert read(path)[0][attribute] == "kept"
+        return
+    with pytest.raises(RefusedError, match="has a name that no other format than HDF5 can hold"):
+        convert_file(tmp_path / "muons.h5", path)
+    assert list(tmp_path.iterdir()) == [tmp_path / "muons.h5"]
+
+
+@FORMS
+def test_a_text_that_hdf5_gives_as_bytes_is_a_text(tmp_path, name):
+    about = {"depth_m": 1.0, "medium": "rock", "note": np.bytes_("µ".encode())}
+    write_muons(tmp_path / "muons.h5", Muons.empty(0), about)
+    convert_file(tmp_path / "muons.h5", tmp_path / f"other.{name}")
+    assert read(tmp_path / f"other.{name}")[0]["note"] in ("µ", "µ".encode())
 
 
 @settings(deadline=None, max_examples=30)
