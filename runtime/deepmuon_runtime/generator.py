@@ -362,15 +362,17 @@ class Generator:
         if selection.target is not None and area is not None:
             raise RefusedError(f"the {selection.target.name} has its own area: leave out the area")
         size = 1.0 if selection.target is not None else area
+        if size is None:
+            raise RefusedError("a live time goes with an area or a target: give one of them")
         for number, meaning in ((live_time, "live time in seconds"), (size, "area in m2")):
-            if not isinstance(number, Real):
-                raise RefusedError(f"{number!r} is no {meaning}: a number is")
-        assert size is not None
+            if not isinstance(number, Real) or number < 0:
+                raise RefusedError(f"{number!r} is no {meaning}: a number above 0 is")
         rate = selection.rate.hz * size
         if not 0 < rate * live_time <= MOST_EXPECTED or not math.isfinite(live_time):
             where = f"on {area:g} m2" if selection.target is None else f"on the {selection.target.name}"
             raise RefusedError(
-                f"{rate * live_time:g} muons are expected in {live_time:g} s {where}, and should be 0 to 10^12"
+                f"{rate * live_time:g} muons are expected in {live_time:g} s {where}, "
+                "and should be above 0 and at most 10^12"
             )
         return Arrivals(rate, seed, selection.source.model.stream, float(live_time))
 
