@@ -93,7 +93,11 @@ def test_no_name_of_a_file_is_recorded(gen, model_file):
             "muons.txt would be HDF5 under a name of text: write muons.h5, and then",
         ),
         ("muons.parquet", "muons.parquet would be HDF5 under a name of Parquet"),
-        ("muons.h5.gz", "muons.h5.gz would be HDF5 under a name of a packed file"),
+        (
+            "muons.h5.gz",
+            "muons.h5.gz would be HDF5 under a name of a packed file: write muons.h5, and then deepmuon-convert "
+            "muons.h5 muons.csv.gz",
+        ),
     ],
 )
 def test_an_output_that_promises_what_is_not_written_is_refused(tmp_path, model_file, output, reason):
@@ -104,6 +108,15 @@ def test_an_output_that_promises_what_is_not_written_is_refused(tmp_path, model_
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
     assert reason in done.stderr
     assert set(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize("name", ["h5", "csv", "mcpl"])
+def test_no_format_goes_to_stdout(tmp_path, model_file, name):
+    words = [*COMMAND, "--model", str(model_file), "-n", "10", "--format", name, "-o", "-"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert "which can't go to stdout" in done.stderr
+    assert not (tmp_path / "-").exists()
 
 
 def test_a_model_of_ones_own_is_taken_from_its_file(gen, model_file):
