@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
@@ -60,6 +60,10 @@ def _summary(report: Report) -> Iterator[tuple[str, str]]:
     known = report.attributes
     if "depth_m" in known and "medium" in known:
         yield "depth", f"{known['depth_m']:g} m of {known['medium']}"
+    if "target" in known:
+        yield "target", f"{known['target']} of {' x '.join(f'{size:g}' for size in known.get('target_size_m', ()))} m"
+    if cuts := ", ".join(_cuts(known)):
+        yield "cuts", cuts
     if report.examined:
         yield "mean kinetic energy", f"{report.mean_energy:.4g} GeV"
         yield "mean cos zenith", f"{report.mean_cos_zenith:.4f}"
@@ -71,6 +75,15 @@ def _summary(report: Report) -> Iterator[tuple[str, str]]:
         yield "rate", f"{known['rate_hz_per_m2']:.2f}{error} per m2 and s"
     if "live_time_s_m2" in known:
         yield "live time", f"{known['live_time_s_m2']:,.1f} s for 1 m2"
+    if "target_rate_hz" in known:
+        uncertainty = known.get("target_rate_uncertainty_hz")
+        error = "" if uncertainty is None else f" +- {uncertainty:.2g}"
+        yield "rate", f"{known['target_rate_hz']:.5g}{error} per s"
+    if "target_live_time_s" in known:
+        yield "live time", f"{known['target_live_time_s']:,.1f} s"
+    if "live_time_s" in known:
+        area = f" on {known['area_m2']:g} m2" if "area_m2" in known else ""
+        yield "times", f"of a run of {known['live_time_s']:g} s{area}"
     if "seed" in known:
         yield "seed", f"{known['seed']}"
     if {"shard", "first", "total"} <= known.keys():
@@ -78,6 +91,17 @@ def _summary(report: Report) -> Iterator[tuple[str, str]]:
     if "model_sha256" in known:
         released = "none of the released ones" if report.model is None else f"the released {report.model.name}"
         yield "model", f"{released}, SHA-256 {known['model_sha256']}"
+
+
+def _cuts(known: Mapping[str, Any]) -> Iterator[str]:
+    """Yield in words what was cut, and what that left."""
+    for name, quantity, unit in (("energy", "kinetic energy", "gev"), ("zenith", "zenith angle", "degrees")):
+        for end, word in (("min", "from"), ("max", "to")):
+            bound = known.get(f"{name}_{end}_{unit}")
+            if bound is not None:
+                yield f"{quantity} {word} {bound:g} {'GeV' if unit == 'gev' else unit}"
+    if "fraction_kept" in known:
+        yield f"{known['fraction_kept']:.4g} of all muons"
 
 
 if __name__ == "__main__":

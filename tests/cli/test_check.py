@@ -20,7 +20,7 @@ from support.thorough import TIMES
 from support.tiny_families import tiny_family
 from support.tiny_models import release, tiny_model
 
-from deepmuon_runtime import Generator, Muons, write_muons
+from deepmuon_runtime import Cuts, Generator, Muons, Plane, write_muons
 
 COMMAND = Path(sysconfig.get_path("scripts")) / "deepmuon-check"
 MANY = Path(__file__).parents[1] / "support" / "run_many.py"
@@ -78,6 +78,23 @@ def test_a_good_file_is_summed_up(check, good_file):
         f"  model               the released quantile-10m.onnx, SHA-256 {sha256}",
         "no defects found",
     ]
+
+
+def test_target_cuts_rate_and_times_are_summed_up(check, tmp_path, model_file):
+    path = tmp_path / "muons.mcpl"
+    generator, target, cuts = Generator.open(file=model_file, device="cpu"), Plane(2, 0.5), Cuts(0.5, 10, zenith_max=60)
+    generator.write(path, seed=7, cuts=cuts, target=target, live_time=30)
+    rate = generator.rate(cuts=cuts, target=target)
+    code, lines, err = check(path)
+    assert (code, err) == (0, "")
+    for line in (
+        "target              plane of 2 x 0.5 m",
+        "cuts                kinetic energy from 0.5 GeV, kinetic energy to 10 GeV, zenith angle to 60 degrees, "
+        f"{generator.fraction_kept(cuts, target):.4g} of all muons",
+        f"rate                {rate.hz:.5g} +- {rate.uncertainty:.2g} per s",
+        "times               of a run of 30 s",
+    ):
+        assert f"  {line}" in lines
 
 
 def test_a_model_of_ones_own_is_no_defect_and_named_as_such(check, tmp_path):
