@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.model.metadata import SPHERE
 from deepmuon_runtime.muon_file.reader import read_attributes, read_pieces
 from deepmuon_runtime.physical import HIGHEST_ENERGY, LOWEST_ENERGY
 
@@ -76,6 +77,7 @@ def count_spectra(path: str | Path, *, progress: Callable[[int], object] | None 
         by_cos_zenith += np.histogram(np.clip(muons.cos_zenith, 0, 1), COS_ZENITH_EDGES)[0]
         if progress is not None:
             progress(len(muons))
-    rate = attributes.get("rate_hz_per_m2")
+    # That of a sphere's muons is none of a horizontal plane's m2.
+    rate = None if attributes.get("surface") == SPHERE else attributes.get("rate_hz_per_m2")
     depth, medium = float(attributes["depth_m"]), str(attributes["medium"])
     return Spectra(Path(path).name, depth, medium, count, rate, by_energy, by_cos_zenith)
