@@ -131,7 +131,10 @@ def test_a_file_of_no_muon_is_a_header(convert, tmp_path):
     ("arguments", "reason"),
     [
         (["missing.h5", "muons.csv"], "missing.h5 can't be read"),
-        (["text.h5", "muons.csv"], "text.h5 can't be read"),
+        (
+            ["text.h5", "muons.csv"],
+            "text.h5 can't be read as a muon file: it is no HDF5; deepmuon-convert makes that",
+        ),
         (["other.csv", "back.h5"], "other.csv can't be read"),
         (["muons.h5"], "Missing argument 'OUT'"),
         (["muons.h5", "no/muons.csv"], "there is no folder"),
