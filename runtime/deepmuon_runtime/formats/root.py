@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import RefusedError, reason
 from deepmuon_runtime.formats.notes import COLUMN_NAMES, said, understood
-from deepmuon_runtime.formats.source import PIECE, Columns, Source, column_types
+from deepmuon_runtime.formats.source import PIECE, Columns, Source
 from deepmuon_runtime.formats.writing import Writer
 from deepmuon_runtime.muon_file.checksum import crc32, unlike
-from deepmuon_runtime.muon_file.format import CHECKSUM, bytes_per_muon
+from deepmuon_runtime.muon_file.format import CHECKSUM, bytes_per_muon, column_types
 
 __all__ = ["MAGIC", "NEEDED", "RootWriter", "bytes_in_tree", "opened_root"]
 

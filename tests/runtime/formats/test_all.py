@@ -129,6 +129,14 @@ def test_what_a_generator_writes_is_good_in_every_format(tmp_path, model_file, n
 
 
 @FORMS
+@pytest.mark.parametrize("optional", [["x"], ["x", "y"], ["weight"], ["time", "z"]])
+def test_columns_that_no_reader_would_take_are_refused_before_anything_is_written(tmp_path, name, optional):
+    path = tmp_path / f"muons.{name}"
+    with pytest.raises(RefusedError, match=rf"{optional[-1]}, which are none of a muon file"):
+        output_format(path).writer(path, ABOUT, optional=optional)
+
+
+@FORMS
 def test_memory_whose_muons_were_written_may_be_filled_again(tmp_path, name):
     columns = some_columns(3000, ("x", "y", "z", "time"))
     path, memory = tmp_path / f"muons.{name}", {key: np.empty(1000, values.dtype) for key, values in columns.items()}
