@@ -152,7 +152,7 @@ class Generator:
             With it, the horizontal area in m2 that they cross; a target has its own.
         on_device
             Whether the columns are CuPy's arrays in the GPU's memory, of a generator on CUDA. torch and JAX take them
-            without a copy (DLPack). All muons without cuts, target and live time are made there; others come from here.
+            without a copy (DLPack). They are made there, unless a body of one's own does not take CuPy's arrays.
 
         Returns
         -------
@@ -393,14 +393,16 @@ class Generator:
     def _sample_on_device(self, run: _Run) -> Muons:
         if self.device != "cuda":
             raise RefusedError("muons can stay on a GPU where they are made there: open the generator on device='cuda'")
-        device = run.selection.source.on_device
-        if device is None:
-            from deepmuon_runtime.cuda.blocks import INSTALL
+        if run.selection.source.on_device is None:
+            from deepmuon_runtime.cuda.maker import INSTALL
 
             raise RefusedError(f"columns in the GPU's memory are CuPy's arrays: {INSTALL}")
-        if run.selection.on_device is None or run.arrivals is not None:
-            return device.copied(self._sample(run))
-        muons = device.empty(len(run.numbers))
+        from deepmuon_runtime.cuda.memory import copied, empty
+
+        selection = run.selection
+        if selection.on_device is None:
+            return copied(self._sample(run))
+        muons = empty(len(run.numbers), has_place=selection.target is not None, has_time=run.arrivals is not None)
         run.fill(muons, run.numbers)
         return muons
 
@@ -483,7 +485,11 @@ class _Run(NamedTuple):
         self.selection.fill(muons, self.seed, part.start, self._check_wanted)
         if self.arrivals is not None:
             assert muons.time is not None
-            muons.time[:] = self.arrivals.times(part)
+            device = self.selection.on_device
+            if device is None:
+                muons.time[:] = self.arrivals.times(part)
+            else:
+                device.fill_times(muons.time, self.arrivals, part)
 
     def parts(self) -> Iterator[range]:
         """Cut the numbers of muons at multiples of many blocks; the first part makes a file's chunks: no small one."""

@@ -108,7 +108,7 @@ class ConvexBody(Target):
         u, v, w, numbers = (part.astype(np.float64) for part in (u, v, w, numbers))
         x, y, z = (self.radius * part for part in entry(u, v, w, numbers))
         with np.errstate(invalid="ignore", divide="ignore"):
-            path = np.asarray(self.path(x, y, z, u, v, w), np.float64)
+            path = np.asarray(self.path(x, y, z, u, v, w), np.float64, like=x)
         hits = np.isfinite(path)
         path = np.where(hits, path, 0.0)
         return Entries(hits, x + path * u, y + path * v, z + path * w)
