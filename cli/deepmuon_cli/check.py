@@ -60,6 +60,8 @@ def _summary(report: Report) -> Iterator[tuple[str, str]]:
     known = report.attributes
     if "depth_m" in known and "medium" in known:
         yield "depth", f"{known['depth_m']:g} m of {known['medium']}"
+    if "flux" in known:
+        yield "flux at sea level", f"{known['flux']}"
     if report.examined:
         yield "mean kinetic energy", f"{report.mean_energy:.4g} GeV"
         yield "mean cos zenith", f"{report.mean_cos_zenith:.4f}"

@@ -78,6 +78,8 @@ class Generator:
         depth: float | None = None,
         architecture: str | None = None,
         *,
+        flux: str | None = None,
+        medium: str | None = None,
         file: str | Path | None = None,
         device: str = "auto",
         threads: int | None = None,
@@ -87,10 +89,14 @@ class Generator:
         Parameters
         ----------
         depth
-            Metres of water above the muons. Of a family, any number in its range; that of a file has its medium, and
-            the depth that stands in it if left out.
+            Metres of the medium above the muons. Of a family, any number in its range; of a file's, the depth that
+            stands in it if left out.
         architecture
             "quantile" or "transformer"; the default one if left out.
+        flux
+            At sea level: "cry", or "measured", which is fitted to measurements; "cry" if left out.
+        medium
+            Above the muons: "water", or "rock", the standard one of 2.65 g/cm3; "water" if left out.
         file
             An ONNX file, instead of a released model.
         device
@@ -109,13 +115,14 @@ class Generator:
         if not isinstance(threads, Integral) or threads < 1:
             raise RefusedError(f"{threads!r} threads can't make muons: 1 or more can")
         if file is not None:
-            if architecture is not None:
-                raise RefusedError("a model's file decides its architecture: give the file, and of a family a depth")
+            for name, chosen in {"architecture": architecture, "flux": flux, "medium": medium}.items():
+                if chosen is not None:
+                    raise RefusedError(f"a model's file decides its {name}: give the file, and of a family a depth")
             name, contents = str(file), read_file(Path(file))
         else:
             if depth is None:
                 raise RefusedError("which model? Give the depth of a released one, or the file of another")
-            released = released_model(depth, architecture)
+            released = released_model(depth, architecture, flux, medium)
             name, contents = released.name, read_released(released)
             depth = depth if released.is_family else None
         return cls(Surfaces(contents, name, depth, device, is_stranger=file is not None), threads)
@@ -434,6 +441,8 @@ class Generator:
             "architecture": model.architecture,
             "device": self.device,
         }
+        if "flux" in model.metadata:
+            said["flux"] = model.flux
         if model.surface == SPHERE:
             said["surface"] = SPHERE
         if selection.cuts:
