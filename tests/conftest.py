@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from support.tiny_families import tiny_family
+from support.tiny_families import tiny_families, tiny_family
 from support.tiny_models import release, tiny_model
 
 # Some tests are about signals that they and all their children would ignore when started in the background of
@@ -38,18 +38,19 @@ def released(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 @pytest.fixture
-def released_family(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """The same with a family among them, whose architecture has models of one depth too."""
-    yield from _in_place_of_the_released(tmp_path / "released", monkeypatch, {"quantile-water.onnx": tiny_family()})
+def released_families(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The same with three families among them: the first has the depths of the quantile models of one depth too."""
+    yield from _in_place_of_the_released(tmp_path / "released", monkeypatch, tiny_families())
 
 
 def _in_place_of_the_released(folder: Path, monkeypatch: pytest.MonkeyPatch, more: dict[str, bytes]) -> Iterator[Path]:
+    of_cry = {"flux": "cry", "medium": "water"}
     release(
         folder,
         {
-            "quantile-0m.onnx": tiny_model(metadata={"depth_m": "0.0", "rate_hz_per_m2": "110.0"}),
-            "quantile-10m.onnx": tiny_model(),
-            "transformer-10m.onnx": tiny_model(8, {"architecture": "transformer"}),
+            "quantile-0m.onnx": tiny_model(metadata={**of_cry, "depth_m": "0.0", "rate_hz_per_m2": "110.0"}),
+            "quantile-10m.onnx": tiny_model(metadata=of_cry),
+            "transformer-10m.onnx": tiny_model(8, {**of_cry, "architecture": "transformer"}),
             **more,
         },
     )

@@ -60,6 +60,8 @@ def _summary(report: Report) -> Iterator[tuple[str, str]]:
     known = report.attributes
     if "depth_m" in known and "medium" in known:
         yield "depth", f"{known['depth_m']:g} m of {known['medium']}"
+    if "flux" in known:
+        yield "flux at sea level", f"{known['flux']}"
     if "target" in known:
         yield "target", f"{known['target']} of {' x '.join(f'{size:g}' for size in known.get('target_size_m', ()))} m"
     if cuts := ", ".join(_cuts(known)):

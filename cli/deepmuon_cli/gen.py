@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, NoReturn
 import click
 from click.core import ParameterSource
 
-from deepmuon_cli.options.completion import architectures, depths, devices
+from deepmuon_cli.options.completion import architectures, depths, devices, fluxes, media
 from deepmuon_cli.options.formats import FORMAT
 from deepmuon_cli.options.mistyped import HelpfulCommand
 from deepmuon_cli.options.quantities import (
     degrees,
+    depth_metres,
     gev,
-    metres,
     muon_number,
     seconds,
     seed_number,
@@ -41,7 +41,8 @@ FILE = click.Path(path_type=Path)
 BETWEEN_LINES = 30.0  # s, of progress in a log
 
 CHARGE = "muons of both charges are written: keep those you want when you read the file"
-MEDIA = "the released models are under water; deepmuon-train transport takes their muons through other materials"
+MATERIAL = "write --medium water or --medium rock; deepmuon-train transport takes muons through other materials"
+DENSITY = "water has 1 g/cm3 and rock 2.65; deepmuon-train source makes muons under others, by --density"
 LEADS = {
     **dict.fromkeys(("--emin", "--min-energy"), "write --energy-min GEV"),
     **dict.fromkeys(("--emax", "--max-energy"), "write --energy-max GEV"),
@@ -52,8 +53,11 @@ LEADS = {
     "--charge": CHARGE,
     **dict.fromkeys(("--target", "--surface", "--detector"), "write --plane, --sphere, --box or --cylinder"),
     "--can": "write --cylinder RADIUS HEIGHT",
-    **dict.fromkeys(("--material", "--medium", "--rock", "--density"), MEDIA),
-    "--flux": "a model has its own, which is CRY's for the released ones",
+    "--material": MATERIAL,
+    "--density": DENSITY,
+    **{f"--{name}": f"write --medium {name}" for name in ("water", "rock")},
+    **{f"--{name}": f"write --flux {name}" for name in ("cry", "measured")},
+    **dict.fromkeys(("--overburden", "--mwe"), "write --depth METRES, of --medium water or --medium rock"),
     **dict.fromkeys(
         ("--csv", "--text", "--root", "--mcpl"), "the end of the file's name says its format: -o muons.mcpl"
     ),
@@ -77,6 +81,8 @@ VALUES = {
     "-n": r"[0-9.,_]+([eE][0-9]+)?",
     "--model": r".*\.onnx",
     "--architecture": r"quantile|transformer",
+    "--flux": r"cry|measured",
+    "--medium": r"water|rock",
     "-o": r".*\.(h5|hdf5|mcpl|csv|root|txt)(\.gz)?",
 }
 """What a word looks like whose option was forgotten."""
@@ -84,7 +90,7 @@ VALUES = {
 CUTS = ("energy_min", "energy_max", "zenith_min", "zenith_max")
 TARGETS = ("plane", "sphere", "box", "cylinder")
 RECORDED = (
-    *("depth", "architecture", "number", "live_time", "area", *CUTS, *TARGETS),
+    *("depth", "architecture", "flux", "medium", "number", "live_time", "area", *CUTS, *TARGETS),
     *("seed", "shard", "device", "threads"),
 )
 """The options that a file records: numbers and names of ours. Names of files are not: they could hold a secret."""
@@ -99,10 +105,22 @@ RECORDED = (
 )
 @click.option(
     "--depth",
-    type=metres,
+    type=depth_metres,
     metavar="METRES",
     shell_complete=depths,
-    help="Metres of water above the muons: any number in the range of a family (see --list).",
+    help="Metres of the medium above the muons: any number in the range of a family (see --list).",
+)
+@click.option(
+    "--flux",
+    metavar="NAME",
+    shell_complete=fluxes,
+    help="At sea level: cry (the default), or measured, fitted to measurements.",
+)
+@click.option(
+    "--medium",
+    metavar="NAME",
+    shell_complete=media,
+    help="Above the muons: water (the default) or rock, the standard one of 2.65 g/cm3.",
 )
 @click.option(
     "--architecture",
@@ -161,6 +179,8 @@ RECORDED = (
 def gen(
     context: click.Context,
     depth: float | None,
+    flux: str | None,
+    medium: str | None,
     architecture: str | None,
     model: Path | None,
     number: int | None,
@@ -186,9 +206,9 @@ def gen(
 ) -> None:
     """Write cosmic-ray muons to a file: HDF5 (.h5), or .mcpl, .mcpl.gz, .root, .csv or .csv.gz by the end of its name.
 
-    The muons cross a horizontal plane downwards, at sea level (--depth 0) or under water, or enter a body: kinetic
-    energy in GeV, direction of motion (u, v, w) with z up, and pdg_id, 13 for mu- and -13 for mu+. With a target they
-    have places (x, y, z) in metres from its centre, with --live-time a time in seconds.
+    The muons cross a horizontal plane downwards, at sea level (--depth 0) or under water or rock, or enter a body:
+    kinetic energy in GeV, direction of motion (u, v, w) with z up, and pdg_id, 13 for mu- and -13 for mu+. With a
+    target they have places (x, y, z) in metres from its centre, with --live-time a time in seconds.
 
     Ten million muons ten metres under water:
 
@@ -205,6 +225,11 @@ def gen(
 
     \b
         deepmuon-gen --depth 10 --box 4 4 3 --live-time 60 -o tank.h5
+
+    Those of the measured flux that cross 100 m2 under a kilometre of rock in a day:
+
+    \b
+        deepmuon-gen --flux measured --medium rock --depth 1000 --live-time 86400 --area 100 -o day.h5
 
     Those of 10 GeV and more that come from 60 to 90 degrees:
 
@@ -230,11 +255,14 @@ def gen(
     """  # noqa: D301 - click looks for the character \b
     started = time.perf_counter()
     if list_only:
-        _print_models()
+        from deepmuon_cli.listing import listing
+
+        for line in listing():
+            click.echo(line)
         return
-    _check_model_options(depth, architecture, model)
+    _check_model_options(depth, model, {"architecture": architecture, "flux": flux, "medium": medium})
     if model is None:
-        _check_released(depth, architecture)
+        _check_released(depth, architecture, flux, medium)
     sizes = {"plane": plane, "sphere": None if sphere is None else (sphere,), "box": box, "cylinder": cylinder}
     given = {name: numbers for name, numbers in sizes.items() if numbers is not None}
     _check_target_options(given)
@@ -252,7 +280,9 @@ def gen(
     cuts = Cuts(energy_min, energy_max, zenith_min, zenith_max)
     target = next((target_of(name, numbers) for name, numbers in given.items()), None)
     output_format(output, form).check_output(output, overwrite, [] if model is None else [model])
-    generator = Generator.open(depth, architecture, file=model, device=device, threads=threads)
+    generator = Generator.open(
+        depth, architecture, flux=flux, medium=medium, file=model, device=device, threads=threads
+    )
     seed = new_seed() if seed is None else seed
     total = number
     if live_time is not None:
@@ -286,19 +316,20 @@ def main() -> NoReturn:
     run(gen, NAME)
 
 
-def _check_model_options(depth: float | None, architecture: str | None, model: Path | None) -> None:
+def _check_model_options(depth: float | None, model: Path | None, released: Mapping[str, str | None]) -> None:
     if depth is None and model is None:
         raise click.UsageError("which muons? Give --depth METRES (--list shows the depths there are), or --model FILE")
-    if model is not None and architecture is not None:
-        raise click.UsageError("--model goes without --architecture: the file has its own")
+    for name, chosen in released.items():
+        if model is not None and chosen is not None:
+            raise click.UsageError(f"--model goes without --{name}: the file has its own")
 
 
-def _check_released(depth: float | None, architecture: str | None) -> None:
+def _check_released(depth: float | None, architecture: str | None, flux: str | None, medium: str | None) -> None:
     """Refuse a depth that there is not before anything else is asked for."""
     from deepmuon_runtime.model.released import released_model
 
     if depth is not None:
-        released_model(depth, architecture)
+        released_model(depth, architecture, flux, medium)
 
 
 def _check_target_options(given: Mapping[str, object]) -> None:
@@ -330,22 +361,6 @@ def _command_line(context: click.Context) -> str:
 
 def _texts(value: object) -> list[str]:
     return [str(part) for part in (value if isinstance(value, tuple) else [value])]
-
-
-def _print_models() -> None:
-    from deepmuon_runtime.model.released import default_architecture, list_models
-
-    default = default_architecture()
-    click.echo("architecture   depth/m   rate/(1/m2/s)   muons/draw   size/kB")
-    for model in list_models():
-        mark = "*" if model.architecture == default else " "
-        rate = "unknown" if model.rate_hz_per_m2 is None else f"{model.rate_hz_per_m2:.2f}"
-        rate = "of the depth" if model.is_family else rate
-        click.echo(
-            f"{model.architecture + mark:12} {model.depths:>9} {rate:>15} {model.muons_per_draw:12} "
-            f"{model.size / 1e3:9.0f}"
-        )
-    click.echo("* the default")
 
 
 @contextmanager

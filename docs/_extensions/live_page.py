@@ -113,7 +113,8 @@ def read_rates(model: Model) -> list[tuple[float, float | None]] | None:
     least, most = np.log([model.depth_min_m + OFFSET, model.depth_max_m + OFFSET])
     between = np.exp(np.linspace(least, most, RATES)) - OFFSET
     depths = [model.depth_min_m, *between[1:-1].tolist(), model.depth_max_m]
-    return [(depth, Generator.open(depth, model.architecture).model.rate_hz_per_m2) for depth in depths]
+    which = {"architecture": model.architecture, "flux": model.flux, "medium": model.medium}
+    return [(depth, Generator.open(depth, **which).model.rate_hz_per_m2) for depth in depths]
 
 
 def read_held_out(evaluation: Path) -> dict[str, list[int]]:

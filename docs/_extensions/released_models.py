@@ -21,18 +21,19 @@ class ReleasedModels(SphinxDirective):
             models = list_models()
         except RefusedError:
             models = []
-        head = ["| architecture | depth | rate / (m² s) | muons a draw | file | size |", "|---|--:|--:|--:|---|--:|"]
-        return self.parse_text_to_nodes("\n".join(head + [_row(model) for model in models]))
+        head = "| architecture | flux | medium | depth | rate / (m² s) | muons a draw | file | size |"
+        return self.parse_text_to_nodes("\n".join([head, "|---|---|---|--:|--:|--:|---|--:|", *map(_row, models)]))
 
 
 def _row(model: Model) -> str:
     rate, uncertainty = model.rate_hz_per_m2, model.rate_uncertainty_hz_per_m2
     unknown = "of the depth" if model.is_family else "unknown"
     texts = [f"{rate:.2f}" if rate else unknown, f" ± {uncertainty:.2f}" if uncertainty else ""]
-    return (
-        f"| {model.architecture} | {model.depths} m | {''.join(texts)} | {model.muons_per_draw} "
-        f"| `{model.name}` | {model.size / 1e3:.0f} kB |"
-    )
+    cells = [
+        *(model.architecture, model.flux, model.medium, f"{model.depths} m", "".join(texts)),
+        *(str(model.muons_per_draw), f"`{model.name}`", f"{model.size / 1e3:.0f} kB"),
+    ]
+    return f"| {' | '.join(cells)} |"
 
 
 def setup(app: Sphinx) -> ExtensionMetadata:

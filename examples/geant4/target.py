@@ -64,7 +64,9 @@ class Beam:
 @click.option("-n", "--number", type=int, help="Muons.")
 @click.option("--live-time", type=float, metavar="SECONDS", help="Instead of -n: the muons of this time, with times.")
 @click.option("--box", nargs=3, type=float, default=(4.0, 4.0, 3.0), show_default=True, help="Its widths in metres.")
-@click.option("--depth", default=10.0, show_default=True, metavar="METRES", help="Of water above the box's centre.")
+@click.option("--depth", default=10.0, show_default=True, metavar="METRES", help="Above the box's centre.")
+@click.option("--flux", metavar="NAME", help="Of the released family: cry (if left out) or measured.")
+@click.option("--medium", metavar="NAME", help="Of the released family: water (if left out) or rock.")
 @click.option("--model", type=click.Path(), help="A family's file, instead of the released one.")
 @click.option("--zenith-min", type=float, metavar="DEGREES", help="Muons that come in flatter than this alone.")
 @click.option("--seed", default=1, show_default=True)
@@ -88,9 +90,9 @@ def main(file: str | None, output: str | None, **wanted: object) -> None:
     os._exit(0)  # the interpreter may crash while it takes Geant4 down
 
 
-def drawn(number, live_time, box, depth, model, zenith_min, seed) -> Beam:
+def drawn(number, live_time, box, depth, flux, medium, model, zenith_min, seed) -> Beam:
     """Return muons from the library."""
-    generator = Generator.open(depth, file=model)
+    generator = Generator.open(depth, flux=flux, medium=medium, file=model)
     which = {"target": Box(*box), "cuts": Cuts(zenith_min=zenith_min)}
     if number is None and live_time is None:
         number = 10_000

@@ -78,6 +78,8 @@ class Generator:
         depth: float | None = None,
         architecture: str | None = None,
         *,
+        flux: str | None = None,
+        medium: str | None = None,
         file: str | Path | None = None,
         device: str = "auto",
         threads: int | None = None,
@@ -87,10 +89,14 @@ class Generator:
         Parameters
         ----------
         depth
-            Metres of water above the muons. Of a family, any number in its range; that of a file has its medium, and
-            the depth that stands in it if left out.
+            Metres of the medium above the muons. Of a family, any number in its range; of a file's, the depth that
+            stands in it if left out.
         architecture
             "quantile" or "transformer"; the default one if left out.
+        flux
+            At sea level: "cry", or "measured", which is fitted to measurements; "cry" if left out.
+        medium
+            Above the muons: "water", or "rock", the standard one of 2.65 g/cm3; "water" if left out.
         file
             An ONNX file, instead of a released model.
         device
@@ -109,13 +115,14 @@ class Generator:
         if not isinstance(threads, Integral) or threads < 1:
             raise RefusedError(f"{threads!r} threads can't make muons: 1 or more can")
         if file is not None:
-            if architecture is not None:
-                raise RefusedError("a model's file decides its architecture: give the file, and of a family a depth")
+            for name, chosen in {"architecture": architecture, "flux": flux, "medium": medium}.items():
+                if chosen is not None:
+                    raise RefusedError(f"a model's file decides its {name}: give the file, and of a family a depth")
             name, contents = str(file), read_file(Path(file))
         else:
             if depth is None:
                 raise RefusedError("which model? Give the depth of a released one, or the file of another")
-            released = released_model(depth, architecture)
+            released = released_model(depth, architecture, flux, medium)
             name, contents = released.name, read_released(released)
             depth = depth if released.is_family else None
         return cls(Surfaces(contents, name, depth, device, is_stranger=file is not None), threads)
@@ -152,7 +159,7 @@ class Generator:
             With it, the horizontal area in m2 that they cross; a target has its own.
         on_device
             Whether the columns are CuPy's arrays in the GPU's memory, of a generator on CUDA. torch and JAX take them
-            without a copy (DLPack). All muons without cuts, target and live time are made there; others come from here.
+            without a copy (DLPack). They are made there, unless a body of one's own does not take CuPy's arrays.
 
         Returns
         -------
@@ -395,14 +402,16 @@ class Generator:
     def _sample_on_device(self, run: _Run) -> Muons:
         if self.device != "cuda":
             raise RefusedError("muons can stay on a GPU where they are made there: open the generator on device='cuda'")
-        device = run.selection.source.on_device
-        if device is None:
-            from deepmuon_runtime.cuda.blocks import INSTALL
+        if run.selection.source.on_device is None:
+            from deepmuon_runtime.cuda.maker import INSTALL
 
             raise RefusedError(f"columns in the GPU's memory are CuPy's arrays: {INSTALL}")
-        if run.selection.on_device is None or run.arrivals is not None:
-            return device.copied(self._sample(run))
-        muons = device.empty(len(run.numbers))
+        from deepmuon_runtime.cuda.memory import copied, empty
+
+        selection = run.selection
+        if selection.on_device is None:
+            return copied(self._sample(run))
+        muons = empty(len(run.numbers), has_place=selection.target is not None, has_time=run.arrivals is not None)
         run.fill(muons, run.numbers)
         return muons
 
@@ -434,6 +443,8 @@ class Generator:
             "architecture": model.architecture,
             "device": self.device,
         }
+        if "flux" in model.metadata:
+            said["flux"] = model.flux
         if model.surface == SPHERE:
             said["surface"] = SPHERE
         if selection.cuts:
@@ -485,7 +496,11 @@ class _Run(NamedTuple):
         self.selection.fill(muons, self.seed, part.start, self._check_wanted)
         if self.arrivals is not None:
             assert muons.time is not None
-            muons.time[:] = self.arrivals.times(part)
+            device = self.selection.on_device
+            if device is None:
+                muons.time[:] = self.arrivals.times(part)
+            else:
+                device.fill_times(muons.time, self.arrivals, part)
 
     def parts(self) -> Iterator[range]:
         """Cut the numbers of muons at multiples of many blocks; the first part makes a file's chunks: no small one."""

@@ -104,8 +104,9 @@ def repetition(inputs: Inputs, random: Random, folder: Path) -> None:
     chosen = models[random.integers(len(models))]
     seed, n = int(random.integers(2**63)), int(random.integers(1, 200_000))
     first = int(random.integers(n))
+    which = {"architecture": chosen.architecture, "flux": chosen.flux, "medium": chosen.medium}
     one, many = (
-        Generator.open(chosen.depth_m, chosen.architecture, device="cpu", threads=threads)
+        Generator.open(chosen.depth_m, **which, device="cpu", threads=threads)
         for threads in (1, int(random.integers(2, 9)))
     )
     see_same(many.sample(n - first, seed, first=first), one.sample(n, seed)[first:], f"{chosen.name}, {n} from {first}")

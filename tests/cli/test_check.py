@@ -15,6 +15,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from support.commands import with_models
 from support.muon_files import sign
 from support.thorough import TIMES
 from support.tiny_families import tiny_family
@@ -33,8 +34,7 @@ def environment(tmp_path_factory):
     """Variables of a process for which the small model is a released one."""
     folder = tmp_path_factory.mktemp("released")
     release(folder, {"quantile-10m.onnx": tiny_model(), "quantile-water.onnx": tiny_family()})
-    others = filter(None, [os.environ.get("PYTHONPATH")])
-    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), *others])}
+    return with_models(folder)
 
 
 @pytest.fixture
@@ -117,6 +117,7 @@ def test_muons_of_a_family_are_those_of_a_released_model_whatever_their_depth(ch
     code, lines, _ = check(of_a_family)
     assert code == 0
     assert "  depth               13.7 m of water" in lines
+    assert "  flux at sea level   test" in lines
     assert "  rate                82.60 +- 0.17 per m2 and s" in lines
     assert any(line.startswith("  model               the released quantile-water.onnx, SHA-256 ") for line in lines)
 
@@ -128,6 +129,7 @@ def test_muons_of_a_family_are_those_of_a_released_model_whatever_their_depth(ch
         ("depth_m", 20.0, "rate_hz_per_m2 is 82.6, and that of its model quantile-water.onnx is 70.0"),
         ("rate_hz_per_m2", 82.7, "rate_hz_per_m2 is 82.7, and that of its model quantile-water.onnx is 82.6"),
         ("medium", "rock", "medium is 'rock', and that of its model quantile-water.onnx is 'water'"),
+        ("flux", "measured", "flux is 'measured', and that of its model quantile-water.onnx is 'test'"),
     ],
 )
 def test_what_a_family_could_not_have_made_is_a_defect(check, of_a_family, name, value, defect):

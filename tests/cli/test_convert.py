@@ -75,6 +75,14 @@ def test_there_and_back_they_are_the_same_muons(convert, tmp_path, name):
     assert {**one, "created": ""} == {**two, "created": ""}
 
 
+@pytest.mark.parametrize("name", ["csv", "mcpl", "root"])
+def test_flux_and_medium_go_along(convert, tmp_path, family_file, name):
+    Generator.open(13.7, file=family_file).write(tmp_path / "family.h5", 100, seed=1)
+    assert convert("family.h5", f"family.{name}") == (0, "", "")
+    attributes = check_file(tmp_path / f"family.{name}").attributes
+    assert (attributes["flux"], attributes["medium"], attributes["depth_m"]) == ("test", "water", 13.7)
+
+
 def test_the_format_is_that_asked_for_where_the_name_says_none(convert, tmp_path):
     assert convert("muons.h5", "muons.dat", "--format", "csv.gz", "--no-header") == (0, "", "")
     text = gzip.decompress((tmp_path / "muons.dat").read_bytes()).decode()

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.commands import with_models
 from support.tiny_models import RARELY_BAD, tiny_model
 
 from deepmuon_cli.gen import main
@@ -217,22 +218,60 @@ def test_the_list_shows_every_model_and_the_default(gen):
     code, out, err = gen("--list")
     assert (code, err) == (0, "")
     rows = [line.split() for line in out.splitlines()]
-    assert [row[:3] for row in rows[1:-1]] == [
-        ["quantile*", "0", "110.00"],
-        ["quantile*", "10", "55.50"],
-        ["transformer", "10", "55.50"],
+    assert [row[:5] for row in rows[1:-1]] == [
+        ["quantile*", "cry", "water", "0", "110.00"],
+        ["quantile*", "cry", "water", "10", "55.50"],
+        ["transformer", "cry", "water", "10", "55.50"],
     ]
 
 
-@pytest.mark.usefixtures("released_family")
-def test_the_list_shows_families_with_their_range(gen):
+@pytest.mark.usefixtures("released_families")
+def test_the_list_shows_what_there_is_to_choose_and_marks_what_is_taken(gen):
     code, out, _ = gen("--list")
     assert code == 0
-    assert re.search(r"^quantile\* +0 to 100 +of the depth +1 +\d+$", out, re.MULTILINE)
-    assert re.search(r"^quantile\* +10 +55\.50 ", out, re.MULTILINE)
+    lines = out.splitlines()
+    assert max(map(len, lines)) <= 100
+    assert [re.split("  +", line)[:6] for line in lines[:-2]] == [
+        ["architecture", "flux", "medium", "depth/m", "rate/(1/m2/s)", "trained on"],
+        ["quantile*", "cry", "water", "0 to 100", "of the depth", "68,000,000"],
+        ["quantile", "cry", "water", "0", "110.00", "unknown"],
+        ["quantile", "cry", "water", "10", "55.50", "unknown"],
+        ["quantile", "measured", "water", "0 to 5000", "of the depth", "68,000,000"],
+        ["quantile", "measured", "rock", "0 to 2500", "of the depth", "68,000,000"],
+        ["transformer", "cry", "water", "10", "55.50", "unknown"],
+    ]
+    assert lines[-2] == "* taken where nothing but a depth is named"
+    assert lines[-1].startswith("A family serves each depth of its range")
 
 
-@pytest.mark.usefixtures("released_family")
+@pytest.mark.usefixtures("released_families")
+def test_flux_and_medium_are_chosen_and_recorded(gen):
+    model = ("--flux", "measured", "--medium", "rock", "--depth", 1000)
+    assert gen(*model, "--live-time", 86400, "--area", 0.01, "--seed", 1, "-o", "muons.h5")[::2] == (0, "")
+    attributes = read_attributes("muons.h5")
+    assert (attributes["flux"], attributes["medium"], attributes["depth_m"]) == ("measured", "rock", 1000)
+    assert attributes["rate_hz_per_m2"] == 30
+    assert attributes["command_line"] == (
+        "deepmuon-gen --depth 1000.0 --flux measured --medium rock --live-time 86400.0 --area 0.01 --seed 1"
+    )
+    generator = Generator.open(1000, flux="measured", medium="rock")
+    expected = generator.sample(live_time=86400, area=0.01, seed=1)
+    assert np.array_equal(read_muons("muons.h5").kinetic_energy, expected.kinetic_energy)
+
+
+@pytest.mark.usefixtures("released_families")
+def test_a_file_says_the_default_flux_too(gen):
+    assert gen("--depth", 10, "-n", 10, "-o", "muons.h5")[0] == 0
+    attributes = read_attributes("muons.h5")
+    assert (attributes["flux"], attributes["medium"]) == ("cry", "water")
+
+
+def test_a_model_that_does_not_say_its_flux_leaves_it_open(gen, model_file):
+    assert gen("--model", model_file, "-n", 10, "-o", "muons.h5")[0] == 0
+    assert "flux" not in read_attributes("muons.h5")
+
+
+@pytest.mark.usefixtures("released_families")
 def test_any_depth_of_a_released_family_is_generated_and_recorded(gen):
     code, out, err = gen("--depth", "13.7", "-n", "1000", "-o", "muons.h5", "--seed", 7)
     assert (code, err) == (0, "")
@@ -244,11 +283,32 @@ def test_any_depth_of_a_released_family_is_generated_and_recorded(gen):
     )
 
 
-@pytest.mark.usefixtures("released_family")
-def test_a_depth_beyond_all_models_is_refused_with_the_range(gen):
-    code, out, err = gen("--depth", "100.5", "-n", "1000", "-o", "muons.h5")
-    assert (code, out, files()) == (2, "", [])
-    assert "no quantile model for a depth of 100.5 m: there are 0 to 100, 0 and 10 m" in err
+@pytest.mark.usefixtures("released_families")
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (
+            "--depth 100.5",
+            "no quantile model of flux cry for a depth of 100.5 m of water: cry in water has 0 to 100 m; measured in "
+            "water has 0 to 5000 m; measured in rock has 0 to 2500 m",
+        ),
+        (
+            "--depth 10 --medium rock",
+            "no released model of flux cry in rock: there are cry in water, measured in water and measured in rock",
+        ),
+        (
+            "--depth 10 --flux ecomug",
+            "no released model of flux ecomug in water: there are cry in water, measured in water and measured in rock",
+        ),
+        (
+            "--depth 10 --flux measured --architecture transformer",
+            "no released transformer of flux measured in water: there is cry in water",
+        ),
+    ],
+)
+def test_a_depth_a_flux_or_a_medium_that_is_lacking_is_refused_with_what_there_is(gen, words, reason):
+    assert gen(*words.split(), "-n", "1000", "-o", "muons.h5") == (2, "", f"deepmuon-gen: {reason}\n")
+    assert files() == []
 
 
 def test_a_model_of_one_depth_takes_none(gen, model_file):
@@ -291,7 +351,7 @@ def test_the_help_teaches_by_an_example(gen):
     code, out, _ = gen("--help")
     assert code == 0
     assert "\n      deepmuon-gen --depth 10 -n 1e7 -o muons.h5\n" in out
-    options = """--depth --architecture --model --number --output --seed --device --threads --overwrite
+    options = """--depth --flux --medium --architecture --model --number --output --seed --device --threads --overwrite
         --shard --list --quiet --version --live-time --area"""
     assert all(option in out for option in options.split())
 
@@ -356,12 +416,14 @@ GOOD = {"--depth": "10", "-n": "10", "-o": "muons.h5"}
         ({"--threads": "0"}, "0 threads can't make muons"),
         ({"--threads": "-2"}, "-2 threads can't make muons"),
         ({"--threads": "two"}, "two is not a whole number"),
-        ({"--depth": "12"}, "no quantile model for a depth of 12 m: there are 0 and 10 m"),
-        ({"--depth": "nan"}, "there are 0 and 10 m"),
+        ({"--depth": "12"}, "for a depth of 12 m of water: cry in water has 0 and 10 m"),
+        ({"--depth": "nan"}, "cry in water has 0 and 10 m"),
         ({"--depth": "deep"}, "deep is no number of metres"),
         ({"--depth": None}, "which muons? Give --depth METRES"),
         ({"--architecture": "flow"}, "there are quantile and transformer"),
         ({"--model": "m.onnx", "--architecture": "quantile"}, "--model goes without --architecture"),
+        ({"--model": "m.onnx", "--flux": "cry"}, "--model goes without --flux: the file has its own"),
+        ({"--model": "m.onnx", "--medium": "water"}, "--model goes without --medium: the file has its own"),
         ({"--depth": None, "--model": "missing.onnx"}, "No such file"),
         ({"--depth": None, "--model": "."}, "is no ONNX file"),
         ({"--device": "gpu"}, "there are auto, cpu, cuda"),
@@ -492,9 +554,13 @@ def test_an_option_that_is_misspelt_is_told_with_the_nearest_one(gen):
         ("--depth 10 -n 1e6 muons.h5", "did you mean -o muons.h5?"),
         ("mine.onnx -n 10", "did you mean --model mine.onnx?"),
         ("list", "did you mean --list?"),
-        ("--depth 15", "no quantile model for a depth of 15 m: there are 0 and 10 m"),
+        ("water --depth 10", "did you mean --medium water?"),
+        ("--depth 10 --flux cry measured", "measured stands alone"),
+        ("--depth 15", "for a depth of 15 m of water: cry in water has 0 and 10 m"),
         ("--depth 10m", "10m is no number of metres: write 10"),
         ("--depth 1.5km", "write 1500"),
+        ("--depth 1000mwe", "1000mwe is no number of metres: write 1000 for water, 377.36 for rock"),
+        ("--depth 6kmwe", "write 6000 for water, 2264.2 for rock"),
         ("--depth 10,5", "write 10.5"),
         ("--depth 1,000", "write 1000 or 1"),
         ("--live-time 1h", "1h is no number of seconds: write 3600"),
@@ -517,8 +583,15 @@ def test_an_option_that_is_misspelt_is_told_with_the_nearest_one(gen):
         ("--Depth 10", "did you mean --depth?"),
         ("--depht 10", "did you mean --depth?"),
         ("--charge 1", "keep those you want when you read the file"),
-        ("--material G4_ROCK", "deepmuon-train transport takes their muons through other materials"),
-        ("--flux cry", "a model has its own"),
+        ("--material G4_ROCK", "deepmuon-train transport takes muons through other materials"),
+        ("--density 2.7", "water has 1 g/cm3 and rock 2.65; deepmuon-train source makes muons under others"),
+        ("--rock", "there is no option --rock; write --medium rock"),
+        ("--water", "write --medium water"),
+        ("--measured", "write --flux measured"),
+        ("--cry", "write --flux cry"),
+        ("--mwe 1000", "write --depth METRES, of --medium water or --medium rock"),
+        ("--fluks cry", "did you mean --flux?"),
+        ("--flux", "Option '--flux' requires an argument"),
         ("--csv", "the end of the file's name says its format: -o muons.mcpl"),
         ("--format text -o muons.h5", "'text' is not one of 'h5', 'mcpl', 'mcpl.gz', 'root', 'csv', 'csv.gz'"),
         ("--gpu", "write --device cuda"),
@@ -550,17 +623,26 @@ def test_messages_have_colours_on_a_terminal_only(tmp_path):
     ("words", "offered"),
     [
         ("--de", ["--depth", "--device"]),
-        ("--depth ", ["0", "10"]),
+        ("--depth ", ["0", "100"]),
+        ("--flux measured --depth ", ["0", "5000"]),
+        ("--flux measured --medium rock --depth 2", ["2500"]),
+        ("--architecture transformer --depth ", ["10"]),
+        ("--medium rock --depth ", []),
         ("--architecture t", ["transformer"]),
+        ("--flux measured --architecture ", ["quantile"]),
+        ("--flux ", ["cry", "measured"]),
+        ("--medium rock --flux ", ["measured"]),
+        ("--medium ", ["rock", "water"]),
+        ("--flux cry --medium ", ["water"]),
         ("--device cu", ["cuda"]),
     ],
 )
-def test_the_shell_completes_options_and_their_values(words, offered):
+def test_the_shell_completes_options_and_their_values(released_families, words, offered):
     line = f"deepmuon-gen {words}"
-    environment = os.environ | {
+    environment = with_models(released_families) | {
         "_DEEPMUON_GEN_COMPLETE": "bash_complete",
         "COMP_WORDS": line,
         "COMP_CWORD": str(line.count(" ")),
     }
     done = subprocess.run(COMMAND, env=environment, capture_output=True, text=True, check=True)
-    assert {f"plain,{word}" for word in offered} <= set(done.stdout.split())
+    assert sorted(done.stdout.split()) == [f"plain,{word}" for word in offered]

@@ -31,7 +31,8 @@ from deepmuon_runtime import Generator, list_models
 
 models = list_models()
 for model in models:
-    assert len(Generator.open(model.depth_m, model.architecture).sample(20_000, seed=1)) == 20_000
+    which = {"architecture": model.architecture, "flux": model.flux, "medium": model.medium}
+    assert len(Generator.open(model.depth_m, **which).sample(20_000, seed=1)) == 20_000
     Generator.open(file=files("deepmuon_models") / model.name)  # as a stranger's, with a trial
 print(f"{len(models)} models sampled by the package")
 """

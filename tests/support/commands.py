@@ -10,7 +10,7 @@ import sys
 import time
 from pathlib import Path
 
-__all__ = ["answers_signals", "command_line", "endings", "wait_for_answers"]
+__all__ = ["answers_signals", "command_line", "endings", "wait_for_answers", "with_models"]
 
 RUN_MANY = Path(__file__).with_name("run_many.py")
 SCRIPT = "import sys; sys.argv[0] = 'deepmuon-{0}'; from deepmuon_cli.start import {0}; sys.exit({0}())"
@@ -19,6 +19,12 @@ SCRIPT = "import sys; sys.argv[0] = 'deepmuon-{0}'; from deepmuon_cli.start impo
 def command_line(command: str, *words: object) -> list[str]:
     """Return what starts a command, as gen, as pip's script does."""
     return [sys.executable, "-c", SCRIPT.format(command), *map(str, words)]
+
+
+def with_models(folder: Path) -> dict[str, str]:
+    """Return variables of a process that finds the released models of a folder, as `tiny_models.release` writes it."""
+    others = filter(None, [os.environ.get("PYTHONPATH")])
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), *others])}
 
 
 def answers_signals(process: subprocess.Popen[str]) -> bool:

@@ -11,7 +11,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from support.tiny_models import METADATA
 
-__all__ = ["KNOTS", "tiny_family", "tiny_rate", "tiny_tables"]
+__all__ = ["KNOTS", "tiny_families", "tiny_family", "tiny_rate", "tiny_tables"]
 
 KNOTS = np.float32([0, 50, 100])
 """Depths in metres."""
@@ -110,6 +110,21 @@ def tiny_family(
     values = {**FAMILY, **(metadata or {})}
     helper.set_model_props(model, {f"deepmuon.{key}": value for key, value in values.items() if value is not None})
     return bytes(model.SerializeToString())
+
+
+def tiny_families() -> dict[str, bytes]:
+    """Return families of three fluxes and media, by the names of their files: to 100, 5000 and 2500 m."""
+    return {
+        f"{name}.onnx": tiny_family(
+            {"flux": flux, "medium": medium, "depth_max_m": str(depth), "training_muons": "68000000"},
+            changes={"spacing": np.float32(depth / 2)},
+        )
+        for name, flux, medium, depth in (
+            ("quantile-water", "cry", "water", 100),
+            ("measured-water", "measured", "water", 5000),
+            ("measured-rock", "measured", "rock", 2500),
+        )
+    }
 
 
 def tiny_tables(depth_m: float, surface: int = 0) -> list[np.ndarray]:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "degrees",
+    "depth_metres",
     "gev",
     "metres",
     "muon_number",
@@ -30,7 +31,9 @@ __all__ = [
 
 # What users write after a number, and how many of the option's own units that is.
 MULTIPLES = {"k": 1e3, "m": 1e6, "million": 1e6, "g": 1e9, "b": 1e9, "billion": 1e9}
-METRES = {"m": 1, "metre": 1, "meter": 1, "cm": 0.01, "km": 1e3, "ft": 0.3048, "mwe": 1, "m.w.e.": 1, "m w.e.": 1}
+METRES = {"m": 1, "metre": 1, "meter": 1, "cm": 0.01, "km": 1e3, "ft": 0.3048}
+OF_WATER = {"mwe": 1, "m.w.e.": 1, "m w.e.": 1, "kmwe": 1e3, "km.w.e.": 1e3, "km w.e.": 1e3}  # metres water equivalent
+ROCK = 2.65  # g/cm3, of the standard rock
 GEV = {"gev": 1, "ev": 1e-9, "kev": 1e-6, "mev": 1e-3, "tev": 1e3}
 DEGREES = {**dict.fromkeys(("degree", "deg", "°"), 1.0), **dict.fromkeys(("radian", "rad"), 180 / math.pi)}
 SQUARE_METRES = {"m2": 1, "m^2": 1, "m²": 1, "cm2": 1e-4, "cm^2": 1e-4, "cm²": 1e-4, "km2": 1e6, "km²": 1e6}
@@ -144,8 +147,22 @@ def square_metres(text: str) -> float:
     return _positive(text, _number(text, "number of m2", SQUARE_METRES))
 
 
+def depth_metres(text: str) -> float:
+    """Read a depth in metres of its medium, of any sign: which depths there are is the library's to say.
+
+    Raises
+    ------
+    click.BadParameter
+        If it is no number.
+    """
+    if not _meant(text, METRES) and (in_water := _meant(text, OF_WATER)):
+        water, rock = _shortest(in_water[0]), f"{in_water[0] / ROCK:.5g}"
+        raise click.BadParameter(f"{text} is no number of metres: write {water} for water, {rock} for rock")
+    return metres(text)
+
+
 def metres(text: str) -> float:
-    """Read a length in metres, of any sign: which depths there are is the library's to say.
+    """Read a length in metres, of any sign.
 
     Raises
     ------

@@ -4,7 +4,7 @@
 0      done
 1      failed while running: disk full, the model gave a bad muon, lost a race for the output,
        stdout not written to its end
-2      refused before anything started: bad arguments, no such depth, bad input, output exists
+2      refused before anything started: bad arguments, no such model, bad input, output exists
 3      `deepmuon-check` found a defect
 129    stopped by SIGHUP: the terminal or the connection was closed
 130    stopped by Ctrl-C

@@ -215,7 +215,8 @@ def _model_defects(sound: Mapping[str, Any], model: Model) -> Iterator[str]:
     if "depth_m" in sound and model.is_family and not model.has_depth(sound["depth_m"]):
         yield f"the attribute depth_m is {sound['depth_m']:g}, and its model {model.name} has {model.depths}"
         return
-    for name in ("depth_m", "medium", "architecture"):
+    flux = ["flux"] if "flux" in sound and "flux" in model.metadata else []
+    for name in ["depth_m", "medium", "architecture", *flux]:
         expected, found = getattr(model, name), sound.get(name)
         if found != expected:
             yield f"the attribute {name} is {_shown(found)}, and that of its model {model.name} is {_shown(expected)}"

@@ -92,10 +92,12 @@ class Surfaces:
 
     def _lacking(self, target: Target) -> str:
         has, needs = "the muons of a sphere", "those of a horizontal plane"
-        if self.own.model.surface == HORIZONTAL_PLANE:
+        own = self.own.model
+        if own.surface == HORIZONTAL_PLANE:
             has, needs = "the muons of a horizontal plane", "those of a sphere, which come from all sides"
-        families = [model.name for model in list_models() if model.is_family]
-        instead = f"{' and '.join(families)} of the released models" if families else "a family (deepmuon-train family)"
+        like_it = [model for model in list_models() if (model.flux, model.medium) == (own.flux, own.medium)]
+        families = [f"{model.name} of the released models" for model in like_it if model.is_family]
+        instead = families[0] if families else "a family (deepmuon-train family)"
         return f"{self._name} has {has}, and a {target.name} needs {needs}: take {instead}"
 
 

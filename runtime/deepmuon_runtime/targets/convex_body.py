@@ -118,10 +118,11 @@ class ConvexBody(Target):
         u, v, w, numbers = (part.astype(np.float64) for part in (u, v, w, numbers))
         x, y, z = (self.radius * part for part in entry(u, v, w, numbers))
         with np.errstate(invalid="ignore", divide="ignore"):
-            path = np.asarray(self.path(x, y, z, u, v, w), np.float64)
+            path = np.asarray(self.path(x, y, z, u, v, w), np.float64, like=x)
         hits = np.isfinite(path)
         path = np.where(hits, path, 0.0)
-        if path.min(initial=0.0) < -MOST_OUTSIDE * self.radius:
+        # A GPU would be waited for; the integration of the rate, on the processor, looks in any case.
+        if isinstance(path, np.ndarray) and path.min(initial=0.0) < -MOST_OUTSIDE * self.radius:
             raise RefusedError(
                 f"the {self.name} reaches {-path.min():.3g} m out of the sphere of {self.radius:g} m that should hold "
                 "all of it: give a larger radius"

@@ -31,6 +31,8 @@ def muon_arrays(
     *,
     depth: float | None = None,
     architecture: str | None = None,
+    flux: str | None = None,
+    medium: str | None = None,
     file: str | Path | None = None,
     device: str = "auto",
     chunk: int = CHUNK,
@@ -46,7 +48,7 @@ def muon_arrays(
         How many, 0 to 2^53.
     seed
         0 to 2^64 - 1; one from the operating system if left out.
-    depth, architecture, file, device
+    depth, architecture, flux, medium, file, device
         The model, as for `Generator.open`. A `file` must lie under the same path on each worker.
     chunk
         Muons of a chunk.
@@ -66,8 +68,8 @@ def muon_arrays(
     if chunk < 1:
         raise RefusedError(f"chunks of {chunk} muons can't be made: 1 or more can")
     file = None if file is None else Path(file).resolve()
-    sha256 = Generator.open(depth, architecture, file=file, device=device).model.sha256
-    source = _Source(depth, architecture, file, device, sha256)
+    sha256 = Generator.open(depth, architecture, flux=flux, medium=medium, file=file, device=device).model.sha256
+    source = _Source(depth, architecture, flux, medium, file, device, sha256)
     pieces = [
         (delayed(_piece, pure=True)(source, seed, first, count), count)
         for first in range(0, max(1, len(numbers)), chunk)
@@ -87,6 +89,8 @@ class _Source:
 
     depth: float | None
     architecture: str | None
+    flux: str | None
+    medium: str | None
     file: Path | None
     device: str
     sha256: str
@@ -99,7 +103,15 @@ def _piece(source: _Source, seed: int, first: int, count: int) -> Muons:
 @lru_cache(maxsize=4)
 def _opened(source: _Source) -> Generator:
     """Open the model in this process; one thread, since a worker computes several pieces side by side."""
-    generator = Generator.open(source.depth, source.architecture, file=source.file, device=source.device, threads=1)
+    generator = Generator.open(
+        source.depth,
+        source.architecture,
+        flux=source.flux,
+        medium=source.medium,
+        file=source.file,
+        device=source.device,
+        threads=1,
+    )
     if generator.model.sha256 != source.sha256:
         raise RefusedError(
             f"{generator.model.name} on this worker has the SHA-256 {generator.model.sha256}, and should have "

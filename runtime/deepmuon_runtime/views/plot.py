@@ -40,7 +40,8 @@ def draw_spectra(spectra: Sequence[Spectra]) -> Figure:
         energy, zenith = figure.subplots(1, 2)
         for each in spectra:
             muon = (each.rate or 1.0) / each.count if per_rate else 1 / each.count
-            label = f"{each.name}: {each.count:,} muons {place(each.depth_m, each.medium)}"
+            flux = f", flux {each.flux}" if each.flux else ""
+            label = f"{each.name}: {each.count:,} muons {place(each.depth_m, each.medium)}{flux}"
             _stairs(energy, each.by_energy, muon / np.diff(np.log(ENERGY_EDGES)), ENERGY_EDGES, label)
             _stairs(zenith, each.by_cos_zenith, muon / np.diff(COS_ZENITH_EDGES), COS_ZENITH_EDGES, label)
         energy.set(xscale="log", yscale="log", xlabel="kinetic energy / GeV")

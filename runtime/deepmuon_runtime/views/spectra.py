@@ -35,6 +35,8 @@ class Spectra:
         The file's.
     depth_m, medium : float, str
         Metres of what lies above.
+    flux : str or None
+        That at sea level, by its name, where it is known.
     count : int
         How many muons.
     rate : float or None
@@ -46,6 +48,7 @@ class Spectra:
     name: str
     depth_m: float
     medium: str
+    flux: str | None
     count: int
     rate: float | None
     by_energy: NDArray[np.int64]
@@ -77,7 +80,14 @@ def count_spectra(path: str | Path, *, progress: Callable[[int], object] | None 
         by_cos_zenith += np.histogram(np.clip(muons.cos_zenith, 0, 1), COS_ZENITH_EDGES)[0]
         if progress is not None:
             progress(len(muons))
-    # That of a sphere's muons is none of a horizontal plane's m2.
-    rate = None if attributes.get("surface") == SPHERE else attributes.get("rate_hz_per_m2")
-    depth, medium = float(attributes["depth_m"]), str(attributes["medium"])
-    return Spectra(Path(path).name, depth, medium, count, rate, by_energy, by_cos_zenith)
+    return Spectra(
+        name=Path(path).name,
+        depth_m=float(attributes["depth_m"]),
+        medium=str(attributes["medium"]),
+        flux=attributes.get("flux"),
+        count=count,
+        # That of a sphere's muons is none of a horizontal plane's m2.
+        rate=None if attributes.get("surface") == SPHERE else attributes.get("rate_hz_per_m2"),
+        by_energy=by_energy,
+        by_cos_zenith=by_cos_zenith,
+    )

@@ -71,6 +71,17 @@ def test_the_attributes_of_a_released_model_are_its_own():
     ]
 
 
+def test_a_flux_is_compared_where_the_file_and_its_model_say_one():
+    stated = replace(MODEL, metadata={"flux": "cry"})
+    other = {**GENERATED, "flux": "measured"}
+    assert list(attribute_defects(GENERATED, stated)) == []
+    assert list(attribute_defects({**GENERATED, "flux": "cry"}, stated)) == []
+    assert list(attribute_defects(other, MODEL)) == []
+    assert list(attribute_defects(other, stated)) == [
+        "the attribute flux is 'measured', and that of its model quantile-10m.onnx is 'cry'"
+    ]
+
+
 NOT_NEEDED = {"rate_uncertainty_hz_per_m2", "command_line"}
 
 

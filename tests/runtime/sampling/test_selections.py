@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -344,6 +345,19 @@ def test_a_body_is_refused_where_there_is_no_flux_through_a_sphere(tmp_path: Pat
     assert len(generator.sample(10, target=Plane(1, 1))) == 10
     with pytest.raises(RefusedError, match="and a box needs those of a sphere, which come from all sides: take"):
         generator.sample(10, target=Box(1, 1, 1))
+
+
+@pytest.mark.usefixtures("released_families")
+def test_a_body_is_refused_with_the_released_family_of_the_models_flux_and_medium(tmp_path: Path):
+    families = {
+        ("cry", "water"): "quantile-water.onnx of the released models",
+        ("measured", "rock"): "measured-rock.onnx of the released models",
+        ("gccly", "rock"): "a family (deepmuon-train family)",
+    }
+    for (flux, medium), instead in families.items():
+        generator = opened(tmp_path, tiny_model(metadata={"flux": flux, "medium": medium}))
+        with pytest.raises(RefusedError, match=f": take {re.escape(instead)}$"):
+            generator.sample(10, target=Box(1, 1, 1))
 
 
 @pytest.mark.parametrize(

@@ -101,6 +101,14 @@ def test_a_killed_worker_changes_nothing(model_file, single, tmp_path: Path):
         assert killed not in client.scheduler_info()["workers"]
 
 
+@pytest.mark.usefixtures("released_families")
+def test_a_flux_and_a_medium_go_to_the_workers():
+    chosen = {"flux": "measured", "medium": "rock"}
+    arrays = muon_arrays(5001, seed=5, depth=1000, chunk=1000, **chosen)
+    single = Generator.open(1000, **chosen).sample(5001, seed=5)
+    assert are_equal(computed(arrays, scheduler="threads"), single)
+
+
 def test_a_depth_of_a_family_goes_to_the_workers(family_file):
     arrays = muon_arrays(5001, seed=5, file=family_file, depth=13.7, chunk=1000)
     single = Generator.open(13.7, file=family_file).sample(5001, seed=5)

@@ -17,7 +17,7 @@ MUONS = Muons.of([1.1, 1.1, 90.0, 0.0011], np.sin(ZENITH), np.zeros(4), -np.cos(
 
 @pytest.fixture
 def write(tmp_path):
-    def run(muons: Muons, **known: float) -> Path:
+    def run(muons: Muons, **known: object) -> Path:
         write_muons(tmp_path / "muons.h5", muons, {"depth_m": 10.0, "medium": "G4_WATER", **known})
         return tmp_path / "muons.h5"
 
@@ -71,6 +71,17 @@ def test_bands_are_one_standard_deviation_of_the_counts(write):
     _, zenith = plot.draw_spectra([count_spectra(write(many, rate_hz_per_m2=50.0))]).axes
     (band,) = [stairs.get_data() for stairs in zenith.patches if stairs.get_fill()]
     np.testing.assert_allclose([band.baseline[0], band.values[0]], 50 / 0.05 * np.array([20, 30]) / 25)
+
+
+def test_the_legend_says_depth_and_medium_and_the_flux_where_that_is_known(write):
+    plot = pytest.importorskip("deepmuon_runtime.views.plot")
+    known = count_spectra(write(MUONS, medium="rock", flux="measured"))
+    figure = plot.draw_spectra([known, replace(known, flux=None)])
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts == [
+        "muons.h5: 4 muons under 10 m of rock, flux measured",
+        "muons.h5: 4 muons under 10 m of rock",
+    ]
 
 
 def test_the_legend_lies_outside_of_the_curves(write):
