@@ -17,6 +17,11 @@ if TYPE_CHECKING:  # the libraries are imported when they are needed: --help is 
 __all__ = ["check", "main"]
 
 NAME = "deepmuon-check"
+RATES = (
+    ("rate_hz_per_m2", "rate_uncertainty_hz_per_m2", ".2f", "m2 and s"),
+    ("target_rate_hz", "target_rate_uncertainty_hz", ".5g", "s"),
+)
+"""Attributes with a rate and its uncertainty, and how they are shown."""
 
 
 @click.command(name=NAME, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -71,16 +76,12 @@ def _summary(report: Report) -> Iterator[tuple[str, str]]:
         yield "mean cos zenith", f"{report.mean_cos_zenith:.4f}"
     if report.mu_minus:
         yield "mu+ / mu-", f"{report.mu_plus / report.mu_minus:.4f}"
-    if "rate_hz_per_m2" in known:
-        uncertainty = known.get("rate_uncertainty_hz_per_m2")
-        error = "" if uncertainty is None else f" +- {uncertainty:.2g}"
-        yield "rate", f"{known['rate_hz_per_m2']:.2f}{error} per m2 and s"
+    for rate, uncertainty, form, of in RATES:
+        if rate in known:
+            error = f" +- {known[uncertainty]:.2g}" if uncertainty in known else ""
+            yield "rate", f"{known[rate]:{form}}{error} per {of}"
     if "live_time_s_m2" in known:
         yield "live time", f"{known['live_time_s_m2']:,.1f} s for 1 m2"
-    if "target_rate_hz" in known:
-        uncertainty = known.get("target_rate_uncertainty_hz")
-        error = "" if uncertainty is None else f" +- {uncertainty:.2g}"
-        yield "rate", f"{known['target_rate_hz']:.5g}{error} per s"
     if "target_live_time_s" in known:
         yield "live time", f"{known['target_live_time_s']:,.1f} s"
     if "live_time_s" in known:
