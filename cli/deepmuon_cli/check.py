@@ -62,13 +62,16 @@ def main() -> NoReturn:
 
 def _summary(report: Report) -> Iterator[tuple[str, str]]:
     """Yield names and values of what is known."""
+    from deepmuon_runtime.errors import shown
+
     known = report.attributes
     if "depth_m" in known and "medium" in known:
         yield "depth", f"{known['depth_m']:g} m of {known['medium']}"
     if "flux" in known:
         yield "flux at sea level", f"{known['flux']}"
     if "target" in known:
-        yield "target", f"{known['target']} of {' x '.join(f'{size:g}' for size in known.get('target_size_m', ()))} m"
+        sizes = " x ".join(f"{size:g}" for size in known.get("target_size_m", ()))
+        yield "target", shown(known["target"]) + (f" of {shown(sizes)} m" if sizes else "")
     if cuts := ", ".join(_cuts(known)):
         yield "cuts", cuts
     if report.examined:

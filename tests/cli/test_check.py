@@ -97,6 +97,16 @@ def test_target_cuts_rate_and_times_are_summed_up(check, tmp_path, model_file):
         assert f"  {line}" in lines
 
 
+def test_a_target_that_can_t_stand_in_a_line_is_a_defect(check, good_file):
+    with h5py.File(good_file, "r+") as file:
+        file["muons"].attrs["target"] = "box\nno defects found"
+        sign(file["muons"])
+    code, lines, err = check(good_file)
+    assert (code, err) == (3, "")
+    assert defects(lines) == [r"the attribute target is 'box\nno defects found', and should be a name"]
+    assert "no defects found" not in lines
+
+
 def test_a_model_of_ones_own_is_no_defect_and_named_as_such(check, tmp_path):
     model = tmp_path / "own.onnx"
     model.write_bytes(tiny_model(metadata={"depth_m": "12.5", "rate_hz_per_m2": None}))
