@@ -16,6 +16,7 @@ from deepmuon_runtime.muons import Muons
 from deepmuon_training.medium import geant4_medium
 
 __all__ = [
+    "PLANE",
     "Sample",
     "read_sample",
     "sample_of",
@@ -105,15 +106,20 @@ def read_sample(path: str | Path, first: int = 0, count: int | None = None) -> S
         If the file is no muon file or a damaged one, does not hold the muons asked for, or its muons came through a
         sphere or into a body: they are no plane's.
     """
-    attributes = read_attributes(path)
+    return sample_of(read_muons(path, first, count), read_attributes(path), path)
+
+
+def sample_of(muons: Muons, attributes: Mapping[str, Any], path: str | Path) -> Sample:
+    """Return muons with what the attributes of a muon file, which lies under a path or could, say of them.
+
+    Raises
+    ------
+    RefusedError
+        If they say that the muons came through a sphere or into a body.
+    """
     if attributes.get("surface", HORIZONTAL_PLANE) != HORIZONTAL_PLANE or attributes.get("target", PLANE) != PLANE:
         what = f"that hit a {attributes['target']}" if "target" in attributes else "through a sphere"
         raise RefusedError(f"{path} has muons {what}, and a sample's cross a horizontal plane: make it without a body")
-    return sample_of(read_muons(path, first, count), attributes)
-
-
-def sample_of(muons: Muons, attributes: Mapping[str, Any]) -> Sample:
-    """Return muons with what the attributes of a muon file say of them."""
     rate, uncertainty = attributes.get("rate_hz_per_m2"), attributes.get("rate_uncertainty_hz_per_m2")
     if attributes.get("target") == PLANE:
         area = math.prod(attributes["target_size_m"])
