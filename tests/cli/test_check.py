@@ -392,6 +392,7 @@ def bytes_of_columns(path: Path) -> list[tuple[str, int, int]]:
     ]
 
 
+@pytest.mark.campaign
 def test_a_flipped_bit_anywhere_in_a_column_is_found_and_its_column_named(endings, good_file, check):
     """The first, the last and 30 other bytes of each column: 160 files."""
     content = good_file.read_bytes()
@@ -505,6 +506,7 @@ def endings(environment, tmp_path):
     return run
 
 
+@pytest.mark.campaign
 def test_no_truncated_file_passes_or_ends_the_check(endings, good_file):
     """200 lengths."""
     content = good_file.read_bytes()
@@ -523,6 +525,7 @@ def bytes_of_no_column(path: Path) -> np.ndarray:
     return np.flatnonzero(is_free)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("where", ["anywhere", "in what describes the columns"])
 def test_random_bytes_never_end_the_check_by_a_signal_or_without_end(endings, good_file, where):
     """250 files in each place, 1 to 8 bytes each. Without the process of its own a few of them end it by SIGSEGV."""
