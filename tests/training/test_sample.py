@@ -9,7 +9,7 @@ import pytest
 from support.tiny_families import tiny_family
 from support.tiny_models import tiny_model
 
-from deepmuon_runtime import Box, Generator, Plane, Sphere
+from deepmuon_runtime import Box, Generator, Plane, Sphere, write_muons
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.model.baking import bake
 from deepmuon_runtime.muon_file.reader import read_attributes
@@ -87,6 +87,12 @@ def test_muons_on_a_rectangle_are_a_sample_with_the_rate_of_a_square_metre(tmp_p
     Generator.open(file=tmp_path / "model.onnx").write(tmp_path / "muons.h5", 10, target=Plane(2, 4))
     sample = read_sample(tmp_path / "muons.h5")
     assert (sample.rate, sample.rate_uncertainty) == pytest.approx((55.5, 0.1))
+
+
+def test_the_rate_on_a_rectangle_of_unknown_size_is_unknown(tmp_path):
+    about = {"depth_m": 1.0, "medium": "rock", "target": "plane", "target_rate_hz": 5.0}
+    write_muons(tmp_path / "muons.h5", MUONS, about)
+    assert read_sample(tmp_path / "muons.h5").rate is None
 
 
 def test_muons_of_cry_say_whose_flux_they_are(cry):

@@ -121,7 +121,7 @@ def sample_of(muons: Muons, attributes: Mapping[str, Any], path: str | Path) -> 
         what = f"that hit a {attributes['target']}" if "target" in attributes else "through a sphere"
         raise RefusedError(f"{path} has muons {what}, and a sample's cross a horizontal plane: make it without a body")
     rate, uncertainty = attributes.get("rate_hz_per_m2"), attributes.get("rate_uncertainty_hz_per_m2")
-    if attributes.get("target") == PLANE:
+    if attributes.get("target") == PLANE and "target_size_m" in attributes:
         area = math.prod(attributes["target_size_m"])
         names = ("target_rate_hz", "target_rate_uncertainty_hz")
         rate, uncertainty = (attributes[name] / area if name in attributes else None for name in names)

@@ -43,7 +43,7 @@ def known_of(table: Table) -> dict[str, Any]:
     for name in ("depth_m", "medium", "created_by", "count"):
         if name not in known:
             raise RefusedError(f"{table.path}: the comments of deepmuon-convert say no {name}")
-    if known.get("target") == PLANE and EXPOSURE[0] in known:
+    if known.get("target") == PLANE and known.keys() >= {"target_size_m", EXPOSURE[0]}:
         known[EXPOSURE[1]] = math.prod(known["target_size_m"])
     return known
 
