@@ -9,7 +9,7 @@ import pytest
 from support.tiny_families import tiny_family
 from support.tiny_models import tiny_model
 
-from deepmuon_runtime import Box, Generator, Plane, Sphere, write_muons
+from deepmuon_runtime import Box, Cuts, Generator, Plane, Sphere, write_muons
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.model.baking import bake
 from deepmuon_runtime.muon_file.reader import read_attributes
@@ -93,6 +93,16 @@ def test_the_rate_on_a_rectangle_of_unknown_size_is_unknown(tmp_path):
     about = {"depth_m": 1.0, "medium": "rock", "target": "plane", "target_rate_hz": 5.0}
     write_muons(tmp_path / "muons.h5", MUONS, about)
     assert read_sample(tmp_path / "muons.h5").rate is None
+
+
+def test_a_sample_says_within_which_cuts_its_muons_are(tmp_path):
+    (tmp_path / "model.onnx").write_bytes(tiny_model())
+    cuts = Cuts(energy_max=10, zenith_min=5.5)
+    Generator.open(file=tmp_path / "model.onnx").write(tmp_path / "cut.h5", 100, seed=1, cuts=cuts)
+    cut = read_sample(tmp_path / "cut.h5")
+    assert cut.provenance[-1] == "cut: energy_max_gev 10, zenith_min_degrees 5.5"
+    write_sample(tmp_path / "again.h5", cut)
+    assert read_sample(tmp_path / "again.h5").provenance == cut.provenance
 
 
 def test_muons_of_cry_say_whose_flux_they_are(cry):

@@ -23,6 +23,9 @@ __all__ = [
     "write_sample",
 ]
 
+CUTS = ("energy_min_gev", "energy_max_gev", "zenith_min_degrees", "zenith_max_degrees")
+"""What a muon file says of the cuts that its muons are within."""
+
 PLANE = "plane"
 """The target whose muons are those of a horizontal plane, at a rate of its own."""
 
@@ -127,11 +130,12 @@ def sample_of(muons: Muons, attributes: Mapping[str, Any], path: str | Path) -> 
         rate, uncertainty = (attributes[name] / area if name in attributes else None for name in names)
     smoothed, variance_factor = attributes.get("smoothed"), attributes.get("variance_factor")
     flux = attributes.get("flux")
+    cuts = ", ".join(f"{name} {attributes[name]:g}" for name in CUTS if name in attributes)
     return Sample(
         muons=muons,
         depth_m=float(attributes["depth_m"]),
         source=str(attributes.get("source") or attributes["created_by"]),
-        provenance=tuple(str(line) for line in attributes.get("provenance", ())),
+        provenance=(*map(str, attributes.get("provenance", ())), *([f"cut: {cuts}"] if cuts else [])),
         medium=geant4_medium(str(attributes["medium"])),
         rate=None if rate is None else float(rate),
         rate_uncertainty=None if uncertainty is None else float(uncertainty),
