@@ -35,7 +35,7 @@ nox.options.sessions = [
 
 REPOSITORY = Path(__file__).parent
 SITE = REPOSITORY / "docs" / "_build"
-PYTHON = "3.11"
+PYTHON, NEWEST = "3.11", "3.13"
 TORCH = "torch==2.13.0"
 """Installed before whatever needs torch, in the version whose build for the CPU alone a machine may keep."""
 
@@ -120,10 +120,14 @@ def tests(session: nox.Session) -> None:
 
 @nox.session(python=["3.10", "3.11", "3.12", "3.13"])
 def runtime(session: nox.Session) -> None:
-    """Test the runtime without torch, its commands and the released models: ``nox -s runtime-3.12 -- -k seed``."""
+    """Test the runtime without torch, its commands and the released models: ``nox -s runtime-3.12 -- -k seed``.
+
+    The tests marked `campaign` take half of the time, and are for the newest Python, and 3.11 (``nox -s tests``).
+    """
     session.install(".[test]")
     session.run("python", "-c", "from importlib.util import find_spec; assert find_spec('torch') is None")
-    session.run("pytest", "-q", "tests/runtime", "tests/cli", "tests/models", *session.posargs)
+    selected = () if session.python == NEWEST else ("-m", "not campaign")
+    session.run("pytest", "-q", *selected, "tests/runtime", "tests/cli", "tests/models", *session.posargs)
 
 
 @nox.session(python=PYTHON, reuse_venv=False)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
@@ -17,6 +17,11 @@ if TYPE_CHECKING:  # the libraries are imported when they are needed: --help is 
 __all__ = ["check", "main"]
 
 NAME = "deepmuon-check"
+RATES = (
+    ("rate_hz_per_m2", "rate_uncertainty_hz_per_m2", ".2f", "m2 and s"),
+    ("target_rate_hz", "target_rate_uncertainty_hz", ".5g", "s"),
+)
+"""Attributes with a rate and its uncertainty, and how they are shown."""
 
 
 @click.command(name=NAME, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -57,22 +62,34 @@ def main() -> NoReturn:
 
 def _summary(report: Report) -> Iterator[tuple[str, str]]:
     """Yield names and values of what is known."""
+    from deepmuon_runtime.errors import shown
+
     known = report.attributes
     if "depth_m" in known and "medium" in known:
         yield "depth", f"{known['depth_m']:g} m of {known['medium']}"
     if "flux" in known:
         yield "flux at sea level", f"{known['flux']}"
+    if "target" in known:
+        sizes = " x ".join(f"{size:g}" for size in known.get("target_size_m", ()))
+        yield "target", shown(known["target"]) + (f" of {shown(sizes)} m" if sizes else "")
+    if cuts := ", ".join(_cuts(known)):
+        yield "cuts", cuts
     if report.examined:
         yield "mean kinetic energy", f"{report.mean_energy:.4g} GeV"
         yield "mean cos zenith", f"{report.mean_cos_zenith:.4f}"
     if report.mu_minus:
         yield "mu+ / mu-", f"{report.mu_plus / report.mu_minus:.4f}"
-    if "rate_hz_per_m2" in known:
-        uncertainty = known.get("rate_uncertainty_hz_per_m2")
-        error = "" if uncertainty is None else f" +- {uncertainty:.2g}"
-        yield "rate", f"{known['rate_hz_per_m2']:.2f}{error} per m2 and s"
+    for rate, uncertainty, form, of in RATES:
+        if rate in known:
+            error = f" +- {known[uncertainty]:.2g}" if uncertainty in known else ""
+            yield "rate", f"{known[rate]:{form}}{error} per {of}"
     if "live_time_s_m2" in known:
         yield "live time", f"{known['live_time_s_m2']:,.1f} s for 1 m2"
+    if "target_live_time_s" in known:
+        yield "live time", f"{known['target_live_time_s']:,.1f} s"
+    if "live_time_s" in known:
+        area = f" on {known['area_m2']:g} m2" if "area_m2" in known else ""
+        yield "times", f"of a run of {known['live_time_s']:g} s{area}"
     if "seed" in known:
         yield "seed", f"{known['seed']}"
     if {"shard", "first", "total"} <= known.keys():
@@ -80,6 +97,17 @@ def _summary(report: Report) -> Iterator[tuple[str, str]]:
     if "model_sha256" in known:
         released = "none of the released ones" if report.model is None else f"the released {report.model.name}"
         yield "model", f"{released}, SHA-256 {known['model_sha256']}"
+
+
+def _cuts(known: Mapping[str, Any]) -> Iterator[str]:
+    """Yield in words what was cut, and what that left."""
+    for name, quantity, unit in (("energy", "kinetic energy", "gev"), ("zenith", "zenith angle", "degrees")):
+        for end, word in (("min", "from"), ("max", "to")):
+            bound = known.get(f"{name}_{end}_{unit}")
+            if bound is not None:
+                yield f"{quantity} {word} {bound:g} {'GeV' if unit == 'gev' else unit}"
+    if "fraction_kept" in known:
+        yield f"{known['fraction_kept']:.4g} of all muons"
 
 
 if __name__ == "__main__":

@@ -307,8 +307,12 @@ def gen(
         )
     if not quiet:
         rate = generator.rate(cuts=cuts, target=target)
-        facts = _facts(count, time.perf_counter() - started, generator.device, rate, target, seed)
-        click.echo(f"{output}: {', '.join(facts)}")
+        seconds = time.perf_counter() - started
+        exposure = _exposure(count, rate, target, live_time, area)
+        if live_time is not None and shard != WHOLE_RUN:
+            exposure = f"shard {shard} of a {exposure}"
+        facts = (f"{count:,} muons in {seconds:.2f} s", f"{count / seconds:,.0f} muons/s on {generator.device}")
+        click.echo(f"{output}: {', '.join((*facts, exposure, f'seed {seed}'))}")
 
 
 def main() -> NoReturn:
@@ -392,19 +396,14 @@ class _Lines:
             click.echo(f"{NAME}: {self._done:,} of {self._number:,} muons", err=True)
 
 
-def _facts(number: int, seconds: float, device: str, rate: Rate | None, target: Target | None, seed: int) -> list[str]:
-    """Return what the closing line says."""
-    live_time = "rate unknown"
-    if rate is not None and target is not None:
-        live_time = f"live time {number / rate.hz:,.1f} s of the {target.name} at {rate.hz:,.5g} a second"
-    elif rate is not None:
-        live_time = f"equivalent live time {number / rate.hz:,.1f} s for 1 m2"
-    return [
-        f"{number:,} muons in {seconds:.2f} s",
-        f"{number / seconds:,.0f} muons/s on {device}",
-        live_time,
-        f"seed {seed}",
-    ]
+def _exposure(count: int, rate: Rate | None, target: Target | None, live_time: float | None, area: float | None) -> str:
+    """Return how long the muons take to come: what was asked for, or what their number stands for."""
+    if rate is None:
+        return "rate unknown"
+    place, hz = (f"the {target.name}", rate.hz) if target is not None else (f"{area or 1:g} m2", rate.hz * (area or 1))
+    if live_time is not None:
+        return f"live time {live_time:,g} s on {place} at {hz:,.5g} a second"
+    return f"equivalent live time {count / hz:,.1f} s for {place} at {hz:,.5g} a second"
 
 
 if __name__ == "__main__":

@@ -18,11 +18,11 @@ from sphinx.errors import ExtensionError
 from sphinx.util import logging
 from sphinx.util.typing import ExtensionMetadata
 
-from deepmuon_runtime import Generator, Model, list_models
+from deepmuon_runtime import Generator, Model
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.model.family import at_depth
 from deepmuon_runtime.model.metadata import SPHERE
-from deepmuon_runtime.model.released import default_architecture, read_released
+from deepmuon_runtime.model.released import read_released, released_model, serving_models
 
 __all__ = ["setup"]
 
@@ -72,24 +72,27 @@ def write_models(evaluations: Path, target: Path) -> None:
     folder = target / "models"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
-    models = list_models()
+    models, default = serving_models(), released_model(0)
     for model in models:
         (folder / model.name).write_bytes(read_released(model))
     released = {
-        "default_architecture": default_architecture(),
-        "models": [describe(model, evaluations) for model in models],
+        "default": default.name,
+        "models": [describe(model, default, evaluations) for model in models],
     }
     (target / "models.json").write_text(json.dumps(released), encoding="utf-8")
 
 
-def describe(model: Model, evaluations: Path) -> dict[str, object]:
+def describe(model: Model, default: Model, evaluations: Path) -> dict[str, object]:
     """Return what the page needs to know of a model: docs/live/models.js has it in words."""
     if model.rate_hz_per_m2 is None and not model.is_family:
         raise ExtensionError(f"the live page needs the rate of {model.name}, which does not know it")
     evaluation = evaluations / f"{Path(model.name).stem}.json"
     held_out = read_held_out(evaluation) if evaluation.exists() else None
+    is_default = (model.flux, model.medium) == (default.flux, default.medium)
     return {field: getattr(model, field) for field in MODEL_FIELDS} | {
+        "options": "" if is_default else f"--flux {model.flux} --medium {model.medium} ",
         "held_out": held_out,
+        "held_out_at": read_held_out_at(evaluation.with_suffix("")) if model.is_family else None,
         "rates": read_rates(model),
         "has_sphere": has_sphere(model),
     }
@@ -104,6 +107,12 @@ def has_sphere(model: Model) -> bool:
     except RefusedError:
         return False
     return True
+
+
+def read_held_out_at(evaluations: Path) -> list[tuple[float, dict[str, list[int]]]]:
+    """Return the depths [m] at which a family was judged by muons through a plane, and how these are distributed."""
+    files = {float(file.stem[:-1]): file for file in evaluations.glob("*m.json")}
+    return [(depth, read_held_out(file)) for depth, file in sorted(files.items())]
 
 
 def read_rates(model: Model) -> list[tuple[float, float | None]] | None:

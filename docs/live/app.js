@@ -31,7 +31,10 @@ class App {
         this.target = new TargetView();
         this.choices = new Choices(
             released,
-            () => this.pick(),
+            () => {
+                this.pick();
+                if (this.choices.family) this.follow();
+            },
             () => this.follow(),
         );
         this.engine = new Engine();
@@ -55,7 +58,7 @@ class App {
         status.textContent = "Ready.";
     }
 
-    /** Another model is picked, and there are no muons of it. */
+    /** Another model is picked, and there are no muons of it yet. */
     pick() {
         this.picks += 1;
         this.blocks = 0;
@@ -91,7 +94,7 @@ class App {
                 if (picks !== this.picks) continue; // another model was picked
                 this.results.begin(model, surface);
                 this.results.show(progress, model, surface, (performance.now() - begun) / 1000);
-                status.textContent = `The spectrum ${place(model.depth_m)}, of ${count(PREVIEW)} muons.`;
+                status.textContent = `The spectrum ${place(model)}, of ${count(PREVIEW)} muons.`;
             }
         } catch (error) {
             this.fail(error);
@@ -110,7 +113,7 @@ class App {
             status.textContent = `Getting the ${model.architecture} model ready …`;
             await this.engine.ask("open", model);
             await this.engine.ask("start", number, seed);
-            status.textContent = `Making ${count(number)} muons ${place(model.depth_m)} …`;
+            status.textContent = `Making ${count(number)} muons ${place(model)} …`;
             const begun = performance.now();
             let [made, seconds, drawn] = [0, 0, 0];
             let coming = this.engine.ask("more");
@@ -127,7 +130,7 @@ class App {
                 this.results.show(progress, model, surface, seconds);
                 drawn = now;
             }
-            this.fileName = `muons-${model.architecture}-${model.depth_m}m-seed-${seed}.csv`;
+            this.fileName = `muons-${nameOf(model)}-seed-${seed}.csv`;
             this.results.showCommand(model, made, seed);
             const wait = duration(made / model.rate_hz_per_m2);
             status.textContent =
@@ -188,6 +191,11 @@ class App {
         this.engine.close(); // what failed may be broken
         this.engine = new Engine();
     }
+}
+
+/** @param {Model} model */
+function nameOf({ flux, medium, architecture, depth_m }) {
+    return `${flux}-${medium}-${architecture}-${depth_m}m`;
 }
 
 /**

@@ -18,6 +18,7 @@
  *
  * @typedef {object} Content
  * @property {string} description for who does not see it
+ * @property {Axis} x
  * @property {Axis} y
  * @property {Steps[]} steps
  * @property {Points} [points]
@@ -69,13 +70,9 @@ export function roundAxis(title, largest) {
 }
 
 export class Chart {
-    /**
-     * @param {HTMLElement} container
-     * @param {Axis} x
-     */
-    constructor(container, x) {
+    /** @param {HTMLElement} container */
+    constructor(container) {
         this.container = container;
-        this.x = x;
         /** @type {Content | undefined} */
         this.content = undefined;
         new ResizeObserver(() => this.redraw()).observe(container);
@@ -91,7 +88,7 @@ export class Chart {
     redraw() {
         const width = this.container.clientWidth;
         if (!this.content || width === 0) return;
-        const { y, steps, points } = this.content;
+        const { x, y, steps, points } = this.content;
         const frame = {
             left: MARGIN.left,
             right: width - MARGIN.right,
@@ -99,12 +96,12 @@ export class Chart {
             bottom: HEIGHT - MARGIN.bottom,
         };
         /** @param {number} value */
-        const atX = (value) => frame.left + this.x.place(value) * (frame.right - frame.left);
+        const atX = (value) => frame.left + x.place(value) * (frame.right - frame.left);
         /** @param {number} value */
         const atY = (value) => frame.bottom - clamp(y.place(value)) * (frame.bottom - frame.top);
         this.container.innerHTML = `
             <svg width="${width}" height="${HEIGHT}" aria-hidden="true">
-                ${drawX(this.x, atX, frame)}
+                ${drawX(x, atX, frame)}
                 ${drawY(y, atY, frame)}
                 ${steps.map((curve) => drawSteps(curve, atX, atY)).join("")}
                 ${points ? drawPoints(points, atX, atY) : ""}

@@ -56,12 +56,13 @@ function placeOf(model, name, data) {
 }
 
 /**
- * The fields of a message of Protocol Buffers that hold bytes.
+ * The fields of a message of Protocol Buffers.
  *
  * @param {Uint8Array<ArrayBuffer>} message
- * @returns {Generator<{number: number, bytes: Uint8Array<ArrayBuffer>}>}
+ * @returns {Generator<{number: number, bytes: Uint8Array<ArrayBuffer>, whole: Uint8Array<ArrayBuffer>}>} their bytes,
+ *     and these with the number and the size before them
  */
-function* fields(message) {
+export function* fields(message) {
     let at = 0;
     const varint = () => {
         let number = 0;
@@ -73,15 +74,22 @@ function* fields(message) {
         }
     };
     while (at < message.length) {
+        const start = at;
         const tag = varint();
         const type = tag % 8;
+        let begin = at;
         if (type === 0) {
             varint();
-            continue;
+        } else {
+            const size = type === 1 ? 8 : type === 2 ? varint() : type === 5 ? 4 : Infinity;
+            if (size > message.length - at) throw new Error("The file is no ONNX file: a field is cut off.");
+            begin = at;
+            at += size;
         }
-        const size = type === 1 ? 8 : type === 2 ? varint() : type === 5 ? 4 : Infinity;
-        if (size > message.length - at) throw new Error("The file is no ONNX file: a field is cut off.");
-        yield { number: Math.floor(tag / 8), bytes: message.subarray(at, at + size) };
-        at += size;
+        yield {
+            number: Math.floor(tag / 8),
+            bytes: message.subarray(begin, at),
+            whole: message.subarray(start, at),
+        };
     }
 }

@@ -1,24 +1,20 @@
-/** A model, ready to give muons. Runs in the worker. */
+/** A model at a depth, ready to give muons. Runs in the worker. */
 
-import { atDepth } from "./family.js";
 import { fetchFile } from "./fetch_file.js";
 import { Latents, modelStream } from "./latents.js";
-import { isFamily } from "./models.js";
-
-const ENGINE = new URL("engine/", import.meta.url);
-const MODELS = new URL("models/", import.meta.url);
+import { Network } from "./network.js";
 
 export class Generator {
     /**
      * @param {import("./models.js").Model} model
-     * @param {typeof import("onnxruntime-web")} ort
-     * @param {import("onnxruntime-web").InferenceSession} session
+     * @param {Network} network
+     * @param {import("./network.js").Tensors} tables of its depth
      * @param {Latents} latents
      */
-    constructor(model, ort, session, latents) {
+    constructor(model, network, tables, latents) {
         this.model = model;
-        this.ort = ort;
-        this.session = session;
+        this.network = network;
+        this.tables = tables;
         this.latents = latents;
         this.stream = modelStream(model);
     }
@@ -28,15 +24,8 @@ export class Generator {
      * @throws {Error} in words
      */
     static async open(model) {
-        const [ort, latents] = await Promise.all([openOnnxRuntime(), openLatents()]);
-        const bytes = await fetchModel(model);
-        try {
-            const placed = isFamily(model) ? atDepth(bytes, model.depth_m, model.surface) : new Uint8Array(bytes);
-            const session = await ort.InferenceSession.create(placed, { executionProviders: ["wasm"] });
-            return new Generator(model, ort, session, latents);
-        } catch (error) {
-            throw new Error(`The model ${model.name} could not be opened: ${reason(error)}`);
-        }
+        const [network, latents] = await Promise.all([Network.of(model), openLatents()]);
+        return new Generator(model, network, await network.at(model.depth_m, model.surface), latents);
     }
 
     /**
@@ -61,92 +50,35 @@ export class Generator {
     }
 
     /**
-     * The muons of latents, and of a family how many come a second and m².
+     * The muons of latents.
      *
      * @param {Float32Array} latent those of each draw
-     * @returns {Promise<import("./tally.js").Muons & {flux: number | undefined}>}
      * @throws {Error} in words, if the model fails
      */
-    async make(latent) {
-        const { name, latent_size } = this.model;
-        const shape = [latent.length / latent_size, latent_size];
-        try {
-            const made = await this.session.run({ latent: new this.ort.Tensor("float32", latent, shape) });
-            return {
-                energy: /** @type {Float32Array} */ (made.kinetic_energy.data),
-                direction: /** @type {Float32Array} */ (made.direction.data),
-                charge: /** @type {Int8Array} */ (made.charge.data),
-                flux: /** @type {Float32Array | undefined} */ (made.rate_hz_per_m2?.data)?.[0],
-            };
-        } catch (error) {
-            throw new Error(`The model ${name} failed: ${reason(error)}`);
-        }
+    make(latent) {
+        return this.network.run(latent, this.tables);
     }
 
-    /** Give its memory back. */
-    async close() {
-        await this.session.release();
+    /**
+     * How many muons of a family come a second and m², here or at another depth; NaN if it does not know.
+     *
+     * @param {number} depth
+     * @returns {Promise<number>}
+     * @throws {Error} in words, if the model fails
+     */
+    async rateAt(depth) {
+        const { rate_hz_per_m2 } = await this.network.at(depth, this.model.surface);
+        return /** @type {Float32Array | undefined} */ (rate_hz_per_m2?.data)?.[0] ?? Number.NaN;
     }
 }
 
-/** @type {Promise<typeof import("onnxruntime-web")> | undefined} */
-let onnxRuntime;
+/** @type {Promise<Latents> | undefined} */
+let latents;
 
-function openOnnxRuntime() {
-    onnxRuntime ??= (async () => {
-        const url = new URL("ort.wasm.bundle.min.mjs", ENGINE);
-        await fetchFile(url, "ONNX Runtime"); // says why, where an import would not
-        const ort = await import(url.href);
-        ort.env.wasm.numThreads = 1; // more would need headers that few sites send
-        ort.env.wasm.wasmBinary = await fetchBytes(new URL("ort-wasm-simd-threaded.wasm", ENGINE), "ONNX Runtime");
-        return ort;
+function openLatents() {
+    latents ??= (async () => {
+        const file = await fetchFile(new URL("engine/random.wasm", import.meta.url), "The generator of random numbers");
+        return Latents.open(await file.arrayBuffer());
     })();
-    return onnxRuntime;
-}
-
-/** @type {{sha256: string, bytes: ArrayBuffer} | undefined} */
-let lastModel;
-
-/**
- * The file of a model; that of the last one is kept, of which another depth may be wanted.
- *
- * @param {import("./models.js").Model} model
- */
-async function fetchModel(model) {
-    if (lastModel?.sha256 !== model.sha256) {
-        const bytes = await fetchBytes(new URL(model.name, MODELS), "The model");
-        await checkHash(bytes, model);
-        lastModel = { sha256: model.sha256, bytes };
-    }
-    return lastModel.bytes;
-}
-
-async function openLatents() {
-    return Latents.open(await fetchBytes(new URL("random.wasm", ENGINE), "The generator of random numbers"));
-}
-
-/**
- * @param {URL} url
- * @param {string} name
- */
-async function fetchBytes(url, name) {
-    return (await fetchFile(url, name)).arrayBuffer();
-}
-
-/**
- * @param {ArrayBuffer} bytes
- * @param {import("./models.js").Model} model
- */
-async function checkHash(bytes, model) {
-    if (!crypto.subtle) return; // only on https and localhost
-    const hash = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes));
-    const found = Array.from(hash, (byte) => byte.toString(16).padStart(2, "0")).join("");
-    if (found !== model.sha256) {
-        throw new Error(`The model ${model.name} is damaged, or newer than this page: load the page again.`);
-    }
-}
-
-/** @param {unknown} error */
-function reason(error) {
-    return (error instanceof Error ? error.message : String(error)).split("\n")[0];
+    return latents;
 }

@@ -1,10 +1,11 @@
 /** What is seen of the muons: figures, charts, the sky, and the command that makes the same. */
 
-import { place } from "./models.js";
+import { optionsOf, place } from "./models.js";
+import { Pace } from "./pace.js";
 import { element } from "./page.js";
 import { Sky } from "./sky.js";
-import { Spectra } from "./spectra.js";
-import { count, duration, rounded } from "./words.js";
+import { isSeenBeside, Spectra } from "./spectra.js";
+import { count, duration, often, oneIn, rounded } from "./words.js";
 
 /** @typedef {import("./models.js").Model} Model */
 /** @typedef {import("./tally.js").Tally} Tally */
@@ -17,6 +18,8 @@ export class Results {
     constructor() {
         this.spectra = new Spectra(element("energy", HTMLElement), element("zenith", HTMLElement));
         this.sky = new Sky(element("sky", HTMLCanvasElement));
+        this.rate = 0; // muons per second and m²
+        this.pace = new Pace(element("pace", HTMLSelectElement), () => this.sky.hurry(this.rate * this.pace.factor));
         const stillness = matchMedia("(prefers-reduced-motion: reduce)");
         stillness.onchange = () => this.move(!stillness.matches);
         motion.onclick = () => this.move(!this.sky.clock.playing);
@@ -38,12 +41,14 @@ export class Results {
      */
     begin(model, surface) {
         for (const id of ["made", "speed", "wait", "mean", "ratio", "unphysical"]) write(id, "–");
-        element("surface-key", HTMLElement).hidden = !surface?.held_out;
+        element("surface-key", HTMLElement).hidden = !isSeenBeside(model, surface);
         element("held-out-key", HTMLElement).hidden = !model.held_out;
         again.hidden = true;
         this.spectra.draw(model, surface, undefined);
-        this.sky.reset(model.rate_hz_per_m2);
-        write("sky-note", `${rounded(model.rate_hz_per_m2)} muons a second ${place(model.depth_m)}`);
+        this.rate = model.rate_hz_per_m2;
+        this.pace.offer(this.rate);
+        this.sky.reset(this.rate * this.pace.factor);
+        write("sky-note", `${often(this.rate)} ${place(model)}${oneIn(this.rate)}`);
     }
 
     /**
@@ -68,8 +73,8 @@ export class Results {
      * @param {number} number
      * @param {bigint} seed
      */
-    showCommand({ depth_m, architecture }, number, seed) {
-        command.textContent = `deepmuon-gen --depth ${depth_m} --architecture ${architecture} -n ${number} --seed ${seed} -o muons.h5`;
+    showCommand(model, number, seed) {
+        command.textContent = `deepmuon-gen ${optionsOf(model)} -n ${number} --seed ${seed} -o muons.h5`;
         again.hidden = false;
     }
 }

@@ -47,6 +47,21 @@ export class Sky {
         this.rewind();
     }
 
+    /**
+     * Let muons come at another rate from now on.
+     *
+     * @param {number} rate muons per second
+     */
+    hurry(rate) {
+        this.rate = rate;
+        this.next = this.seconds + this.wait();
+    }
+
+    /** How long it is to the next muon: they are independent, a Poisson process. */
+    wait() {
+        return -Math.log(1 - Math.random()) / this.rate;
+    }
+
     /** @param {Float32Array} arrivals energy, u and v of each muon */
     add(arrivals) {
         const added = arrivals.subarray(0, this.muons.length - 3 * this.known);
@@ -70,7 +85,7 @@ export class Sky {
 
     rewind() {
         this.seconds = 0;
-        this.next = 0;
+        this.next = this.wait();
         this.arrived = 0;
         this.shining = [];
         this.film.clearRect(0, 0, this.exposure.width, this.exposure.height);
@@ -84,12 +99,12 @@ export class Sky {
 
     /** @param {number} seconds */
     advance(seconds) {
-        this.seconds += seconds;
-        while (this.next < this.seconds && this.known > 0) {
+        if (this.known > 0) this.seconds += seconds;
+        while (this.next < this.seconds) {
             const arrival = this.arrive();
             this.expose(arrival, 0.6);
             this.shining.push(arrival);
-            this.next -= Math.log(1 - Math.random()) / this.rate; // independent muons: a Poisson process
+            this.next += this.wait();
         }
         this.shining = this.shining.filter(({ time }) => this.seconds - time < FLASH);
         this.paint();

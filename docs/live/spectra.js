@@ -3,18 +3,22 @@
 import { Chart, linearAxis, logAxis, roundAxis } from "./chart.js";
 import { place } from "./models.js";
 import { CosZenithBins, EnergyBins } from "./tally.js";
+import { periodOf } from "./words.js";
 
 /** @typedef {import("./models.js").Model} Model */
 /** @typedef {import("./models.js").Counts} Counts */
 /** @typedef {{values: number[], errors: number[]}} Density */
+/** @typedef {import("./chart.js").Axis} Axis */
 /** @typedef {null | undefined} Nothing */
 
-const ENERGY = logAxis("kinetic energy / GeV", -2, 3);
 const COS_ZENITH = linearAxis("cosine of the zenith angle", 1, 0.2);
-const BY_LOG_ENERGY = logAxis("E dΦ/dE  /  m⁻² s⁻¹", -3, 2);
-const BY_COS_ZENITH = "dΦ/d cos θ  /  m⁻² s⁻¹";
+const LEAST_ENERGY = -2; // exponent, as of the bins
+const DECADES = 5; // of the rate that are seen
+const HIGHEST = 0.6; // E dΦ/dE in shares of the rate: no spectrum is as narrow
+const SEEN_BESIDE = 100; // how many more muons there may be at sea level for its spectrum to be drawn, too
 
-const LOG_ENERGY_WIDTH = Math.LN10 / 10;
+const BINS_A_DECADE = 10;
+const LOG_ENERGY_WIDTH = Math.LN10 / BINS_A_DECADE;
 const COS_ZENITH_WIDTH = 1 / CosZenithBins.count;
 const HALF = CosZenithBins.count / 2; // the bins below cos 60°
 
@@ -24,8 +28,8 @@ export class Spectra {
      * @param {HTMLElement} zenith
      */
     constructor(energy, zenith) {
-        this.energy = new Chart(energy, ENERGY);
-        this.zenith = new Chart(zenith, COS_ZENITH);
+        this.energy = new Chart(energy);
+        this.zenith = new Chart(zenith);
     }
 
     /**
@@ -34,47 +38,67 @@ export class Spectra {
      * @param {Counts | undefined} generated none if left out
      */
     draw(model, surface, generated) {
-        const rate = model.rate_hz_per_m2;
+        const { rate_hz_per_m2, held_out } = model;
+        const { seconds, unit } = periodOf(rate_hz_per_m2);
+        const rate = rate_hz_per_m2 * seconds;
+        const above = isSeenBeside(model, surface) ? surface : undefined;
+        const rateAbove = (above?.rate_hz_per_m2 ?? 0) * seconds;
+        const top = Math.ceil(Math.log10(HIGHEST * Math.max(rate, rateAbove)));
         this.drawEnergy(
-            place(model.depth_m),
+            place(model),
+            logAxis("kinetic energy / GeV", LEAST_ENERGY, energiesTo(rate_hz_per_m2)),
+            logAxis(`E dΦ/dE  /  m⁻² ${unit}`, top - DECADES, top),
             generated && energyDensity(generated, rate),
-            model.held_out && energyDensity(model.held_out, rate),
-            surface?.held_out && energyDensity(surface.held_out, surface.rate_hz_per_m2),
+            held_out && energyDensity(held_out, rate),
+            above?.held_out && energyDensity(above.held_out, rateAbove),
         );
         this.drawZenith(
-            place(model.depth_m),
+            place(model),
+            `dΦ/d cos θ  /  m⁻² ${unit}`,
             generated && zenithDensity(generated, rate),
-            model.held_out && zenithDensity(model.held_out, rate),
+            held_out && zenithDensity(held_out, rate),
         );
     }
 
     /**
      * @param {string} where
+     * @param {Axis} x
+     * @param {Axis} y
      * @param {Density | Nothing} generated
      * @param {Density | Nothing} heldOut
      * @param {Density | Nothing} surface
      */
-    drawEnergy(where, generated, heldOut, surface) {
+    drawEnergy(where, x, y, generated, heldOut, surface) {
         const { edges } = EnergyBins;
         const shown = generated ?? heldOut;
-        const peak = shown && edges[shown.values.indexOf(Math.max(...shown.values))].toPrecision(2);
+        const peak = shown && Number(edges[shown.values.indexOf(Math.max(...shown.values))].toPrecision(2));
+        const bins = BINS_A_DECADE * (x.ticks.length - 1);
+        const within = (/** @type {number[]} */ values) => values.slice(0, bins);
         this.energy.draw({
             description: peak ? `Energy spectrum ${where}: most muons a decade near ${peak} GeV` : "No muons yet",
-            y: BY_LOG_ENERGY,
+            x,
+            y,
             steps: [
-                ...(surface ? [{ name: "surface", edges, values: surface.values }] : []),
-                ...(generated ? [{ name: "generated", edges, values: generated.values }] : []),
+                ...(surface ? [{ name: "surface", edges, values: within(surface.values) }] : []),
+                ...(generated ? [{ name: "generated", edges, values: within(generated.values) }] : []),
             ],
-            points: heldOut ? { edges, ...heldOut } : undefined,
+            points: heldOut
+                ? {
+                      edges,
+                      values: within(heldOut.values),
+                      errors: within(heldOut.errors),
+                  }
+                : undefined,
         });
     }
 
     /**
      * @param {string} where
+     * @param {string} title
      * @param {Density | Nothing} generated
      * @param {Density | Nothing} heldOut
      */
-    drawZenith(where, generated, heldOut) {
+    drawZenith(where, title, generated, heldOut) {
         const { edges } = CosZenithBins;
         const shown = (heldOut ?? generated)?.values ?? [1];
         const flat = (100 * sum(shown.slice(0, HALF))) / sum(shown);
@@ -82,11 +106,31 @@ export class Spectra {
             description:
                 `Zenith distribution ${where}: it falls from the zenith to the horizon, and ` +
                 `${flat.toPrecision(2)} % come from more than 60 degrees`,
-            y: roundAxis(BY_COS_ZENITH, 1.05 * Math.max(...shown)),
+            x: COS_ZENITH,
+            y: roundAxis(title, 1.05 * Math.max(...shown)),
             steps: generated ? [{ name: "generated", edges, values: generated.values }] : [],
             points: heldOut ? { edges, ...heldOut } : undefined,
         });
     }
+}
+
+/**
+ * Whether a spectrum at sea level is drawn beside another: it is known, and within the same axis.
+ *
+ * @param {Model} model
+ * @param {Model | undefined} surface
+ */
+export function isSeenBeside(model, surface) {
+    return Boolean(surface?.held_out) && (surface?.rate_hz_per_m2 ?? 0) < SEEN_BESIDE * model.rate_hz_per_m2;
+}
+
+/**
+ * Up to which power of ten of GeV energies are drawn: where fewer muons come, they are the harder ones.
+ *
+ * @param {number} hz muons per second and m²
+ */
+function energiesTo(hz) {
+    return hz >= 1 ? 3 : hz >= 0.01 ? 4 : 5;
 }
 
 /** @param {Counts} counts @param {number} rate */

@@ -9,7 +9,7 @@
 
 const { abs, floor, min } = Math;
 
-const EDGES = Array.from({ length: 51 }, (_, i) => 10 ** (i / 10 - 2));
+const EDGES = Array.from({ length: 71 }, (_, i) => 10 ** (i / 10 - 2));
 
 /**
  * The bin of the least float32 whose upper 16 bits are these. Numbers that share them are within 1 % of each other, and
@@ -24,13 +24,13 @@ const BIN_OF_BITS = (() => {
     });
 })();
 
-/** Bins even in the logarithm of the kinetic energy, ten a decade from 10 MeV to 1 TeV: those of docs/scores.md. */
+/** Bins even in the logarithm of the kinetic energy, ten a decade from 10 MeV to 100 TeV; those to 1 TeV of docs/scores.md. */
 export const EnergyBins = {
-    count: 50,
+    count: 70,
     edges: EDGES,
 
     /**
-     * @param {number} energy in GeV; gives 0 below and 51 above the bins
+     * @param {number} energy in GeV; gives 0 below and 71 above the bins
      * @param {number} bits of it as a positive float32
      */
     index: (energy, bits) => {

@@ -4,10 +4,32 @@ const integer = new Intl.NumberFormat("en");
 const three = new Intl.NumberFormat("en", { maximumSignificantDigits: 3 });
 
 const DAY = 86400;
+const YEAR = 365.25 * DAY;
+
+/** Times in which muons are counted, the shortest first: the word, the unit of a rate, seconds. */
+const PERIODS = [
+    { name: "a second", unit: "s⁻¹", seconds: 1 },
+    { name: "a minute", unit: "min⁻¹", seconds: 60 },
+    { name: "an hour", unit: "h⁻¹", seconds: 3600 },
+    { name: "a day", unit: "day⁻¹", seconds: DAY },
+    { name: "a year", unit: "year⁻¹", seconds: YEAR },
+];
+
+/** @type {[string, number][]} the longest first */
+const WAITS = [
+    ["years", YEAR],
+    ["months", YEAR / 12],
+    ["weeks", 7 * DAY],
+    ["days", DAY],
+    ["hours", 3600],
+    ["minutes", 60],
+];
+
+const SLOW = 0.1; // muons a second, of which fewer are told by how long one takes
 
 /** @type {[string, number][]} */
 const UNITS = [
-    ["year", 365.25 * DAY],
+    ["year", YEAR],
     ["day", DAY],
     ["h", 3600],
     ["min", 60],
@@ -34,6 +56,7 @@ export function duration(seconds) {
     const largest = UNITS.findIndex(([, size]) => seconds >= size);
     const [[, size], [, finer]] = UNITS.slice(largest, largest + 2);
     const whole = Math.floor((Math.round(seconds / finer) * finer) / size);
+    if (whole >= 100) return `${rounded(whole)} ${UNITS[largest][0]}s`; // years
     const rest = Math.round((seconds - whole * size) / finer);
     return [units(whole, UNITS[largest]), rest > 0 && units(rest, UNITS[largest + 1])].filter(Boolean).join(" ");
 }
@@ -47,6 +70,38 @@ function units(number, [unit, size]) {
 }
 
 /**
+ * The shortest of the times in which one muon or more comes.
+ *
+ * @param {number} hz muons per second
+ */
+export function periodOf(hz) {
+    return PERIODS.find(({ seconds }) => hz * seconds >= 1) ?? PERIODS[PERIODS.length - 1];
+}
+
+/**
+ * How often muons come: "56 muons a second", "17.4 muons a year".
+ *
+ * @param {number} hz
+ */
+export function often(hz) {
+    const { name, seconds } = periodOf(hz);
+    const number = rounded(hz * seconds);
+    return `${number} ${number === "1" ? "muon" : "muons"} ${name}`;
+}
+
+/**
+ * How long one muon takes, where that is long: ", one in 3 weeks".
+ *
+ * @param {number} hz
+ */
+export function oneIn(hz) {
+    if (hz >= SLOW) return "";
+    const seconds = 1 / hz;
+    const [name, size] = WAITS.find(([, size]) => seconds >= 1.5 * size) ?? ["seconds", 1];
+    return `, one in ${rounded(Math.round(seconds / size))} ${name}`;
+}
+
+/**
  * The depth that a reader typed, in metres.
  *
  * @param {string} text
@@ -55,7 +110,7 @@ function units(number, [unit, size]) {
  * @throws {RangeError} in words, if it is none
  */
 export function readDepth(text, least, most) {
-    return readMetres(text, least, most, `How deep? From ${least} to ${most} m, such as 13.7.`);
+    return readMetres(text, least, most, `How deep? From ${least} to ${most} m.`);
 }
 
 /**

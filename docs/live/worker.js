@@ -16,9 +16,7 @@ const answers = {
     /** @param {import("./models.js").Model} model */
     async open(model) {
         if (isOf(generator, model)) return;
-        const opened = await Generator.open(model);
-        await generator?.close();
-        generator = opened;
+        generator = await Generator.open(model);
     },
 
     /**
@@ -36,7 +34,7 @@ const answers = {
     csv: (block) => run.csv(block),
 
     /**
-     * The muons per second that hit a body, and some of them.
+     * The muons per second that hit a body, some of them, and what comes to its ends if that differs.
      *
      * @param {import("./models.js").Model} model a family at a depth
      * @param {import("./target/bodies.js").Kind} kind
@@ -44,13 +42,9 @@ const answers = {
      * @param {bigint} seed
      */
     async aim(model, kind, sizes, seed) {
-        if (!aim || !isOf(aim.generator, model)) {
-            const opened = await Aim.open(model);
-            await aim?.close();
-            aim = opened;
-        }
+        if (!aim || !isOf(aim.generator, model)) aim = await Aim.open(model);
         const body = bodyOf(kind, sizes);
-        return { hz: aim.rate(body), hits: await aim.hits(body, seed) };
+        return { hz: aim.rate(body), hits: await aim.hits(body, seed), ends: await aim.ends(body) };
     },
 };
 

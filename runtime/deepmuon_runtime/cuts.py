@@ -100,7 +100,7 @@ class Cuts:
         rounding
             How far energies and cos zenith may be from what they were, relative.
         """
-        kept = np.ones(len(muons), bool)
+        kept = np.ones_like(muons.kinetic_energy, bool)
         if self.cut_energy:
             _cut(kept, muons.kinetic_energy, self.energies, rounding)
         if self.cut_zenith:

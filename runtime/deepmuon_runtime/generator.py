@@ -159,7 +159,7 @@ class Generator:
             With it, the horizontal area in m2 that they cross; a target has its own.
         on_device
             Whether the columns are CuPy's arrays in the GPU's memory, of a generator on CUDA. torch and JAX take them
-            without a copy (DLPack). All muons without cuts, target and live time are made there; others come from here.
+            without a copy (DLPack). They are made there, unless a body of one's own does not take CuPy's arrays.
 
         Returns
         -------
@@ -369,15 +369,17 @@ class Generator:
         if selection.target is not None and area is not None:
             raise RefusedError(f"the {selection.target.name} has its own area: leave out the area")
         size = 1.0 if selection.target is not None else area
+        if size is None:
+            raise RefusedError("a live time goes with an area or a target: give one of them")
         for number, meaning in ((live_time, "live time in seconds"), (size, "area in m2")):
-            if not isinstance(number, Real):
-                raise RefusedError(f"{number!r} is no {meaning}: a number is")
-        assert size is not None
+            if not isinstance(number, Real) or number < 0:
+                raise RefusedError(f"{number!r} is no {meaning}: a number above 0 is")
         rate = selection.rate.hz * size
         if not 0 < rate * live_time <= MOST_EXPECTED or not math.isfinite(live_time):
             where = f"on {area:g} m2" if selection.target is None else f"on the {selection.target.name}"
             raise RefusedError(
-                f"{rate * live_time:g} muons are expected in {live_time:g} s {where}, and should be 0 to 10^12"
+                f"{rate * live_time:g} muons are expected in {live_time:g} s {where}, "
+                "and should be above 0 and at most 10^12"
             )
         return Arrivals(rate, seed, selection.source.model.stream, float(live_time))
 
@@ -400,14 +402,16 @@ class Generator:
     def _sample_on_device(self, run: _Run) -> Muons:
         if self.device != "cuda":
             raise RefusedError("muons can stay on a GPU where they are made there: open the generator on device='cuda'")
-        device = run.selection.source.on_device
-        if device is None:
-            from deepmuon_runtime.cuda.blocks import INSTALL
+        if run.selection.source.on_device is None:
+            from deepmuon_runtime.cuda.maker import INSTALL
 
             raise RefusedError(f"columns in the GPU's memory are CuPy's arrays: {INSTALL}")
-        if run.selection.on_device is None or run.arrivals is not None:
-            return device.copied(self._sample(run))
-        muons = device.empty(len(run.numbers))
+        from deepmuon_runtime.cuda.memory import copied, empty
+
+        selection = run.selection
+        if selection.on_device is None:
+            return copied(self._sample(run))
+        muons = empty(len(run.numbers), has_place=selection.target is not None, has_time=run.arrivals is not None)
         run.fill(muons, run.numbers)
         return muons
 
@@ -492,7 +496,11 @@ class _Run(NamedTuple):
         self.selection.fill(muons, self.seed, part.start, self._check_wanted)
         if self.arrivals is not None:
             assert muons.time is not None
-            muons.time[:] = self.arrivals.times(part)
+            device = self.selection.on_device
+            if device is None:
+                muons.time[:] = self.arrivals.times(part)
+            else:
+                device.fill_times(muons.time, self.arrivals, part)
 
     def parts(self) -> Iterator[range]:
         """Cut the numbers of muons at multiples of many blocks; the first part makes a file's chunks: no small one."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -71,12 +71,19 @@ class Muons:
         return Muons(**{name: column[index] for name, column in self.columns.items()})
 
     @classmethod
-    def empty(cls, n: int, *, has_place: bool = False, has_time: bool = False) -> Muons:
-        """Return n muons whose columns are yet to be filled."""
-        energy, u, v, w = (np.empty(n, np.float32) for _ in range(4))
-        place = {axis: np.empty(n, np.float32) for axis in ("x", "y", "z")} if has_place else {}
-        time = np.empty(n, np.float64) if has_time else None
-        return cls(energy, u, v, w, np.empty(n, np.int8), **place, time=time)
+    def empty(
+        cls,
+        n: int,
+        *,
+        has_place: bool = False,
+        has_time: bool = False,
+        column: Callable[[int, type], NDArray[Any]] = np.empty,
+    ) -> Muons:
+        """Return n muons whose columns, made by `column` of n and a type, are yet to be filled."""
+        energy, u, v, w = (column(n, np.float32) for _ in range(4))
+        place = {axis: column(n, np.float32) for axis in ("x", "y", "z")} if has_place else {}
+        time = column(n, np.float64) if has_time else None
+        return cls(energy, u, v, w, column(n, np.int8), **place, time=time)
 
     @classmethod
     def of(cls, kinetic_energy: ArrayLike, u: ArrayLike, v: ArrayLike, w: ArrayLike, pdg_id: ArrayLike) -> Muons:

@@ -1,6 +1,6 @@
 """Measures what a GPU makes: on the device, in pinned memory, in a file, and with torch in a training loop.
 
-It needs an NVIDIA GPU, onnxruntime-gpu and CuPy (docs/gpu.md), takes 2 minutes, and writes gpu.json and gpu.md beside
+It needs an NVIDIA GPU, onnxruntime-gpu and CuPy (docs/gpu.md), takes 3 minutes, and writes gpu.json and gpu.md beside
 itself:
 
 \b
@@ -21,7 +21,7 @@ from typing import Any
 import click
 import numpy as np
 
-from deepmuon_runtime import Generator
+from deepmuon_runtime import Box, Cuts, Generator, Plane
 from studies.shared.processes import cores, machine
 from studies.shared.report import write
 
@@ -29,6 +29,12 @@ ARCHITECTURES = ("quantile", "transformer")
 DEPTH = 10
 SECONDS = 2.0  # of each measurement, at least
 ON_DEVICE, AT_ONCE, IN_FILE = 1 << 26, 1 << 22, 10**8  # muons
+CHOSEN: dict[str, dict[str, Any]] = {
+    "of 10 GeV and more": {"cuts": Cuts(energy_min=10)},
+    "up to 60 degrees": {"cuts": Cuts(zenith_max=60)},
+    "on a plane": {"target": Plane(4, 4)},
+    "in a box, of a family": {"target": Box(4, 4, 3)},
+}
 
 
 @click.command(help=__doc__)
@@ -40,7 +46,13 @@ def main() -> None:
     for architecture in ARCHITECTURES:
         generator = Generator.open(DEPTH, architecture, device="cuda")
         rates[architecture] = {
-            "on the device": rate(lambda g=generator: g.sample(ON_DEVICE, 1, on_device=True), ON_DEVICE),
+            "on the device": rate(on_device(generator), ON_DEVICE),
+            **{
+                f"on the device, {name}": rate(on_device(generator, **asked), ON_DEVICE)
+                for name, asked in CHOSEN.items()
+                if generator.model.is_family or not isinstance(asked.get("target"), Box)
+            },
+            "on the device, with times": rate(with_times(generator), ON_DEVICE),
             "in pinned memory": rate(lambda g=generator: through(g), ON_DEVICE),
             "in an HDF5 file": file_rate(generator),
         }
@@ -69,6 +81,18 @@ def rate(make: Callable[[], object], muons: int) -> float:
         cupy.cuda.Device().synchronize()
         runs += 1
     return runs * muons / (time.perf_counter() - begun) / 1e6
+
+
+def on_device(generator: Generator, **asked: Any) -> Callable[[], object]:
+    """Return muons that stay on the GPU."""
+    return lambda: generator.sample(ON_DEVICE, 1, on_device=True, **asked)
+
+
+def with_times(generator: Generator) -> Callable[[], object]:
+    """Return as many, with their times."""
+    rate = generator.rate()
+    assert rate is not None
+    return lambda: generator.sample(live_time=ON_DEVICE / rate.hz, area=1.0, seed=1, on_device=True)
 
 
 def through(generator: Generator) -> None:

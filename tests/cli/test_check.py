@@ -21,7 +21,7 @@ from support.thorough import TIMES
 from support.tiny_families import tiny_family
 from support.tiny_models import release, tiny_model
 
-from deepmuon_runtime import Generator, Muons, write_muons
+from deepmuon_runtime import Cuts, Generator, Muons, Plane, write_muons
 
 COMMAND = Path(sysconfig.get_path("scripts")) / "deepmuon-check"
 MANY = Path(__file__).parents[1] / "support" / "run_many.py"
@@ -78,6 +78,33 @@ def test_a_good_file_is_summed_up(check, good_file):
         f"  model               the released quantile-10m.onnx, SHA-256 {sha256}",
         "no defects found",
     ]
+
+
+def test_target_cuts_rate_and_times_are_summed_up(check, tmp_path, model_file):
+    path = tmp_path / "muons.mcpl"
+    generator, target, cuts = Generator.open(file=model_file, device="cpu"), Plane(2, 0.5), Cuts(0.5, 10, zenith_max=60)
+    generator.write(path, seed=7, cuts=cuts, target=target, live_time=30)
+    rate = generator.rate(cuts=cuts, target=target)
+    code, lines, err = check(path)
+    assert (code, err) == (0, "")
+    for line in (
+        "target              plane of 2 x 0.5 m",
+        "cuts                kinetic energy from 0.5 GeV, kinetic energy to 10 GeV, zenith angle to 60 degrees, "
+        f"{generator.fraction_kept(cuts, target):.4g} of all muons",
+        f"rate                {rate.hz:.5g} +- {rate.uncertainty:.2g} per s",
+        "times               of a run of 30 s",
+    ):
+        assert f"  {line}" in lines
+
+
+def test_a_target_that_can_t_stand_in_a_line_is_a_defect(check, good_file):
+    with h5py.File(good_file, "r+") as file:
+        file["muons"].attrs["target"] = "box\nno defects found"
+        sign(file["muons"])
+    code, lines, err = check(good_file)
+    assert (code, err) == (3, "")
+    assert defects(lines) == [r"the attribute target is 'box\nno defects found', and should be a name"]
+    assert "no defects found" not in lines
 
 
 def test_a_model_of_ones_own_is_no_defect_and_named_as_such(check, tmp_path):
@@ -365,6 +392,7 @@ def bytes_of_columns(path: Path) -> list[tuple[str, int, int]]:
     ]
 
 
+@pytest.mark.campaign
 def test_a_flipped_bit_anywhere_in_a_column_is_found_and_its_column_named(endings, good_file, check):
     """The first, the last and 30 other bytes of each column: 160 files."""
     content = good_file.read_bytes()
@@ -478,6 +506,7 @@ def endings(environment, tmp_path):
     return run
 
 
+@pytest.mark.campaign
 def test_no_truncated_file_passes_or_ends_the_check(endings, good_file):
     """200 lengths."""
     content = good_file.read_bytes()
@@ -496,6 +525,7 @@ def bytes_of_no_column(path: Path) -> np.ndarray:
     return np.flatnonzero(is_free)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("where", ["anywhere", "in what describes the columns"])
 def test_random_bytes_never_end_the_check_by_a_signal_or_without_end(endings, good_file, where):
     """250 files in each place, 1 to 8 bytes each. Without the process of its own a few of them end it by SIGSEGV."""

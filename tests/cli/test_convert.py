@@ -99,9 +99,12 @@ def test_stdout_gets_what_a_file_gets_but_for_the_checksum_at_its_end(convert, t
     assert there == here
 
 
-def test_a_reader_that_goes_ends_the_command_silently(convert, tmp_path):
+@pytest.mark.parametrize("name", ["h5", "csv", "mcpl.gz", "root"])
+def test_a_reader_that_goes_ends_the_command_silently(convert, tmp_path, name):
+    if name != "h5":
+        convert("muons.h5", f"muons.{name}")
     done = subprocess.run(
-        f"'{COMMAND}' muons.h5 - | grep -m 1 kinetic; exit ${{PIPESTATUS[0]}}",
+        f"'{COMMAND}' muons.{name} - | grep -m 1 kinetic; exit ${{PIPESTATUS[0]}}",
         shell=True,
         executable="/bin/bash",
         cwd=tmp_path,
@@ -110,6 +113,18 @@ def test_a_reader_that_goes_ends_the_command_silently(convert, tmp_path):
         timeout=120,
     )
     assert (done.returncode, done.stdout, done.stderr) == (141, "kinetic_energy_GeV,u,v,w,pdg_id\n", "")
+
+
+@pytest.mark.parametrize("name", ["h5", "csv", "mcpl.gz", "root"])
+def test_a_full_disk_is_a_failure_of_the_output_whatever_is_read(convert, tmp_path, name):
+    if name != "h5":
+        convert("muons.h5", f"muons.{name}")
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [COMMAND, f"muons.{name}", "-"], cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True, timeout=120
+        )
+    assert done.returncode == 1
+    assert done.stderr == "deepmuon-convert: stdout was not written to its end: No space left on device\n"
 
 
 def test_a_file_of_no_muon_is_a_header(convert, tmp_path):
@@ -124,7 +139,10 @@ def test_a_file_of_no_muon_is_a_header(convert, tmp_path):
     ("arguments", "reason"),
     [
         (["missing.h5", "muons.csv"], "missing.h5 can't be read"),
-        (["text.h5", "muons.csv"], "text.h5 can't be read"),
+        (
+            ["text.h5", "muons.csv"],
+            "text.h5 can't be read as a muon file: it is no HDF5; deepmuon-convert makes that",
+        ),
         (["other.csv", "back.h5"], "other.csv can't be read"),
         (["muons.h5"], "Missing argument 'OUT'"),
         (["muons.h5", "no/muons.csv"], "there is no folder"),

@@ -20,6 +20,8 @@ from support.tiny_models import RARELY_BAD, tiny_model
 
 from deepmuon_runtime import check_file, read_attributes
 
+pytestmark = pytest.mark.campaign
+
 COMMAND = Path(sysconfig.get_path("scripts")) / "deepmuon-gen"
 LONGEST = 600  # s, on any machine
 STRIKES = 10 * TIMES  # of each signal

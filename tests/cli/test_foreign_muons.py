@@ -19,6 +19,8 @@ from support.thorough import TIMES
 
 from deepmuon_runtime import Generator, Shard, check_file, read_attributes, read_muons
 
+pytestmark = pytest.mark.campaign
+
 SCRIPTS = Path(sysconfig.get_path("scripts"))
 SEED = 5
 

@@ -51,7 +51,7 @@ def test_the_main_job_gives_the_muons_of_the_model_and_says_so(gen):
     assert (code, err) == (0, "")
     assert re.fullmatch(
         r"muons\.h5: 1,000 muons in \d+\.\d\d s, [\d,]+ muons/s on cpu, "
-        r"equivalent live time 18\.0 s for 1 m2, seed 7\n",
+        r"equivalent live time 18\.0 s for 1 m2 at 55\.5 a second, seed 7\n",
         out,
     )
     assert files() == ["muons.h5"]
@@ -94,7 +94,11 @@ def test_no_name_of_a_file_is_recorded(gen, model_file):
             "muons.txt would be HDF5 under a name of text: write muons.h5, and then",
         ),
         ("muons.parquet", "muons.parquet would be HDF5 under a name of Parquet"),
-        ("muons.h5.gz", "muons.h5.gz would be HDF5 under a name of a packed file"),
+        (
+            "muons.h5.gz",
+            "muons.h5.gz would be HDF5 under a name of a packed file: write muons.h5, and then deepmuon-convert "
+            "muons.h5 muons.csv.gz",
+        ),
     ],
 )
 def test_an_output_that_promises_what_is_not_written_is_refused(tmp_path, model_file, output, reason):
@@ -105,6 +109,15 @@ def test_an_output_that_promises_what_is_not_written_is_refused(tmp_path, model_
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
     assert reason in done.stderr
     assert set(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize("name", ["h5", "csv", "mcpl"])
+def test_no_format_goes_to_stdout(tmp_path, model_file, name):
+    words = [*COMMAND, "--model", str(model_file), "-n", "10", "--format", name, "-o", "-"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert "which can't go to stdout" in done.stderr
+    assert not (tmp_path / "-").exists()
 
 
 def test_a_model_of_ones_own_is_taken_from_its_file(gen, model_file):
@@ -160,6 +173,7 @@ def test_shards_are_the_single_run(gen, model_file, amount):
         assert code == 0
         assert out.startswith(f"{i}.h5: {len(joined[-1]):,} muons in ")
         assert read_attributes(f"{i}.h5")["shard"] == f"{i}/3"
+        assert (f"shard {i}/3 of a live time 1,000 s on 1 m2 at 55.5 a second" in out) == ("--live-time" in amount)
     for column in ("kinetic_energy", "u", "v", "w", "pdg_id"):
         assert np.array_equal(getattr(Muons.concatenate(joined), column), getattr(read_muons("all.h5"), column))
 
@@ -169,7 +183,9 @@ def test_a_live_time_gives_a_poisson_number_at_the_models_rate(gen, model_file):
     counts = []
     for seed in range(20):
         arguments = ("--live-time", "1e2", "--area", "0.5", "-o", f"{seed}.h5", "--seed", seed)
-        assert gen("--model", model_file, *arguments)[0] == 0
+        code, out, _ = gen("--model", model_file, *arguments)
+        assert code == 0
+        assert "live time 100 s on 0.5 m2 at 27.75 a second" in out
         attributes = read_attributes(f"{seed}.h5")
         assert attributes["count"] == attributes["total"] == len(read_muons(f"{seed}.h5"))
         assert (attributes["live_time_s"], attributes["area_m2"]) == (100, 0.5)

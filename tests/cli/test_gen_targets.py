@@ -49,7 +49,7 @@ def test_the_muons_of_a_box_in_a_live_time_are_written_and_recorded(gen):
     assert (said["target"], said["target_size_m"], said["surface"]) == ("box", [4, 4, 0.5], 1)
     assert (said["live_time_s"], said["energy_min_gev"]) == (10, 2)
     assert said["fraction_kept"] == pytest.approx(0.2, rel=1e-3)
-    assert f"s of the box at {said['target_rate_hz']:.5g} a second" in out
+    assert f"live time 10 s on the box at {said['target_rate_hz']:.5g} a second" in out
     assert check_file("muons.h5").defects == []
 
 

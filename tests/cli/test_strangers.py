@@ -18,6 +18,8 @@ from deepmuon_runtime import Generator, Shard, check_file, list_models
 from deepmuon_runtime.files.partial import PARTIAL_SUFFIX
 from deepmuon_runtime.model.released import read_released
 
+pytestmark = pytest.mark.campaign
+
 SEED = 4
 
 

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { atDepth, SPHERE } from "../../docs/live/family.js";
-import { depthAlong, familyAt, isFamily, shareOfRange } from "../../docs/live/models.js";
+import { depthAlong, depthBeside, familyAt, isFamily, marksAlong, shareOfRange } from "../../docs/live/models.js";
 import { readDepth, readSize } from "../../docs/live/words.js";
 
 /** @typedef {import("../../docs/live/models.js").Family} Family */
@@ -107,8 +107,24 @@ const family = /** @type {Family} */ (
             [10, 56],
             [100, 2.5],
         ],
+        held_out_at: [[10, { by_energy: [1], by_cos_zenith: [2] }]],
     })
 );
+
+/** A family whose muons are as rare at its end as those of 5 km of water. */
+const deep = /** @type {Family} */ ({
+    ...family,
+    depth_max_m: 5000,
+    rates: Array.from({ length: 65 }, (_, i) => {
+        const depth = 0.7 * (5000.7 / 0.7) ** (i / 64) - 0.7;
+        return [i === 64 ? 5000 : Math.abs(depth), rateAt(depth)];
+    }),
+});
+
+/** @param {number} depth */
+function rateAt(depth) {
+    return 110 * (1 + depth / 5) ** -1.2 * Math.exp(-depth / 500);
+}
 
 test("a slider's way through the range goes there and back, in three digits", () => {
     assert.equal(depthAlong(family, 0), 0);
@@ -120,6 +136,46 @@ test("a slider's way through the range goes there and back, in three digits", ()
         assert.ok(Math.abs(shareOfRange(family, depth) - share) < 0.005);
         last = depth;
     }
+});
+
+test("a slider through kilometres is fine near the surface, and coarse below", () => {
+    assert.deepEqual(
+        [0, 0.1, 0.2, 0.4, 0.6, 0.8, 1].map((share) => depthAlong(deep, share)),
+        [0, 1, 3.43, 23.7, 143, 847, 5000],
+    );
+    assert.deepEqual(marksAlong(deep), [0, 1, 10, 100, 1000, 5000]);
+    assert.deepEqual(marksAlong(family), [0, 1, 10, 100]);
+});
+
+test("a key goes to the next round depth, and to the ends of the range", () => {
+    /** @param {number} from @param {1 | -1} direction @param {boolean} isFar */
+    const way = (from, direction, isFar) => {
+        const depths = [from];
+        while (depths.length < 100) {
+            const next = depthBeside(deep, depths[depths.length - 1], direction, isFar);
+            if (next === depths[depths.length - 1]) break;
+            depths.push(next);
+        }
+        return depths;
+    };
+    assert.deepEqual(way(0, 1, true), [0, 0.1, 1, 10, 100, 1000, 5000]);
+    assert.deepEqual(way(5000, -1, true), [5000, 1000, 100, 10, 1, 0.1, 0]);
+    assert.deepEqual(way(1370, -1, false).slice(0, 4), [1370, 1200, 1000, 800]);
+    assert.deepEqual(way(13.7, 1, false).slice(0, 4), [13.7, 15, 20, 25]);
+    assert.equal(way(0, 1, false).length, 49);
+    assert.equal(way(2.3, 1, false).at(-1), 5000);
+});
+
+test("where rates fall by nine powers of ten, that between known depths is right within one in a thousand", () => {
+    for (let depth = 0; depth <= 5000; depth += 0.3 + depth / 20) {
+        const { rate_hz_per_m2 } = familyAt(deep, depth);
+        assert.ok(Math.abs(rate_hz_per_m2 / rateAt(depth) - 1) < 1e-3, `${depth}: ${rate_hz_per_m2}`);
+    }
+});
+
+test("the muons by which a family was judged are those of the very depth", () => {
+    assert.deepEqual(familyAt(family, 10).held_out, { by_energy: [1], by_cos_zenith: [2] });
+    assert.equal(familyAt(family, 10.1).held_out, null);
 });
 
 test("the rate at a depth is the known one there, and lies between its neighbours' elsewhere", () => {

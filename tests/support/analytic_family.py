@@ -77,6 +77,9 @@ family (float[draws, 5] latent)
 }
 """
 
+OF_DEPTH = ("is_sphere", "power", "root", "faded", "share", "of_plane", "more", "gain", "rate", "rate_hz_per_m2")
+"""What depends on depth and surface alone."""
+
 
 def analytic_family(metadata: Mapping[str, str | None] | None = None) -> bytes:
     """Return the family; metadata are values other than its own, None leaves a key out."""
@@ -89,5 +92,7 @@ def analytic_family(metadata: Mapping[str, str | None] | None = None) -> bytes:
         **(metadata or {}),
     }
     model = parser.parse_model(GRAPH)
+    for node in model.graph.node:
+        node.name = f"{'depth' if node.output[0] in OF_DEPTH else 'muon'}/{node.output[0]}"
     helper.set_model_props(model, {f"deepmuon.{key}": value for key, value in values.items() if value is not None})
     return bytes(model.SerializeToString())

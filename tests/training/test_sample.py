@@ -6,8 +6,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from support.tiny_families import tiny_family
+from support.tiny_models import tiny_model
 
+from deepmuon_runtime import Box, Cuts, Generator, Plane, Sphere, write_muons
 from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.model.baking import bake
 from deepmuon_runtime.muon_file.reader import read_attributes
 from deepmuon_runtime.muons import Muons
 from deepmuon_training.data.cry import CRY_SHOWER_VARIANCE, HELD_OUT_CRY_MUONS, read_cry
@@ -65,6 +69,40 @@ def test_a_sample_comes_back_as_it_was_written(tmp_path, known):
 def test_a_sample_names_its_medium_as_geant4_does(tmp_path, of_model, geant4s):
     write_sample(tmp_path / "sample.h5", Sample(MUONS, depth_m=10.0, source="a model", medium=of_model))
     assert read_sample(tmp_path / "sample.h5").medium == geant4s
+
+
+@pytest.mark.parametrize(
+    ("target", "reason"),
+    [(None, "has muons through a sphere"), (Sphere(0.1), "has muons that hit a sphere"), (Box(1, 1, 1), "hit a box")],
+)
+def test_muons_of_a_sphere_or_a_body_are_no_sample_of_a_plane(tmp_path, target, reason):
+    (tmp_path / "model.onnx").write_bytes(bake(tiny_family(), 50, 1))
+    Generator.open(file=tmp_path / "model.onnx").write(tmp_path / "muons.h5", 10, target=target)
+    with pytest.raises(RefusedError, match=rf"muons\.h5 .*{reason}, and a sample's cross a horizontal plane"):
+        read_sample(tmp_path / "muons.h5")
+
+
+def test_muons_on_a_rectangle_are_a_sample_with_the_rate_of_a_square_metre(tmp_path):
+    (tmp_path / "model.onnx").write_bytes(tiny_model())
+    Generator.open(file=tmp_path / "model.onnx").write(tmp_path / "muons.h5", 10, target=Plane(2, 4))
+    sample = read_sample(tmp_path / "muons.h5")
+    assert (sample.rate, sample.rate_uncertainty) == pytest.approx((55.5, 0.1))
+
+
+def test_the_rate_on_a_rectangle_of_unknown_size_is_unknown(tmp_path):
+    about = {"depth_m": 1.0, "medium": "rock", "target": "plane", "target_rate_hz": 5.0}
+    write_muons(tmp_path / "muons.h5", MUONS, about)
+    assert read_sample(tmp_path / "muons.h5").rate is None
+
+
+def test_a_sample_says_within_which_cuts_its_muons_are(tmp_path):
+    (tmp_path / "model.onnx").write_bytes(tiny_model())
+    cuts = Cuts(energy_max=10, zenith_min=5.5)
+    Generator.open(file=tmp_path / "model.onnx").write(tmp_path / "cut.h5", 100, seed=1, cuts=cuts)
+    cut = read_sample(tmp_path / "cut.h5")
+    assert cut.provenance[-1] == "cut: energy_max_gev 10, zenith_min_degrees 5.5"
+    write_sample(tmp_path / "again.h5", cut)
+    assert read_sample(tmp_path / "again.h5").provenance == cut.provenance
 
 
 def test_muons_of_cry_say_whose_flux_they_are(cry):

@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.model.metadata import HORIZONTAL_PLANE
 from deepmuon_runtime.muon_file.reader import read_attributes, read_muons
 from deepmuon_runtime.muon_file.writer import write_muons
 from deepmuon_runtime.muons import Muons
 from deepmuon_training.medium import geant4_medium
 
 __all__ = [
+    "PLANE",
     "Sample",
     "read_sample",
     "sample_of",
     "write_sample",
 ]
+
+CUTS = ("energy_min_gev", "energy_max_gev", "zenith_min_degrees", "zenith_max_degrees")
+"""What a muon file says of the cuts that its muons are within."""
+
+PLANE = "plane"
+"""The target whose muons are those of a horizontal plane, at a rate of its own."""
 
 
 @dataclass(frozen=True)
@@ -96,22 +106,36 @@ def read_sample(path: str | Path, first: int = 0, count: int | None = None) -> S
     Raises
     ------
     RefusedError
-        If the file is no muon file or a damaged one, or does not hold the muons asked for.
+        If the file is no muon file or a damaged one, does not hold the muons asked for, or its muons came through a
+        sphere or into a body: they are no plane's.
     """
-    return sample_of(read_muons(path, first, count), read_attributes(path))
+    return sample_of(read_muons(path, first, count), read_attributes(path), path)
 
 
-def sample_of(muons: Muons, attributes: Mapping[str, Any]) -> Sample:
-    """Return muons with what the attributes of a muon file say of them."""
-    rate = attributes.get("rate_hz_per_m2")
-    uncertainty = attributes.get("rate_uncertainty_hz_per_m2")
+def sample_of(muons: Muons, attributes: Mapping[str, Any], path: str | Path) -> Sample:
+    """Return muons with what the attributes of a muon file, which lies under a path or could, say of them.
+
+    Raises
+    ------
+    RefusedError
+        If they say that the muons came through a sphere or into a body.
+    """
+    if attributes.get("surface", HORIZONTAL_PLANE) != HORIZONTAL_PLANE or attributes.get("target", PLANE) != PLANE:
+        what = f"that hit a {attributes['target']}" if "target" in attributes else "through a sphere"
+        raise RefusedError(f"{path} has muons {what}, and a sample's cross a horizontal plane: make it without a body")
+    rate, uncertainty = attributes.get("rate_hz_per_m2"), attributes.get("rate_uncertainty_hz_per_m2")
+    if attributes.get("target") == PLANE and "target_size_m" in attributes:
+        area = math.prod(attributes["target_size_m"])
+        names = ("target_rate_hz", "target_rate_uncertainty_hz")
+        rate, uncertainty = (attributes[name] / area if name in attributes else None for name in names)
     smoothed, variance_factor = attributes.get("smoothed"), attributes.get("variance_factor")
     flux = attributes.get("flux")
+    cuts = ", ".join(f"{name} {attributes[name]:g}" for name in CUTS if name in attributes)
     return Sample(
         muons=muons,
         depth_m=float(attributes["depth_m"]),
         source=str(attributes.get("source") or attributes["created_by"]),
-        provenance=tuple(str(line) for line in attributes.get("provenance", ())),
+        provenance=(*map(str, attributes.get("provenance", ())), *([f"cut: {cuts}"] if cuts else [])),
         medium=geant4_medium(str(attributes["medium"])),
         rate=None if rate is None else float(rate),
         rate_uncertainty=None if uncertainty is None else float(uncertainty),

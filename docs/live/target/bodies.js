@@ -3,6 +3,7 @@
  * Directions (u, v, w) are those of motion, z up, and w < 0; sizes are in metres.
  *
  * @typedef {object} Body
+ * @property {number} height from its top to its foot
  * @property {number} reach the radius of a sphere that holds it
  * @property {number} largestArea to which a muon's chance of being taken is relative
  * @property {(u: number, v: number, w: number) => number} projectedArea of its shadow across a direction
@@ -24,6 +25,7 @@ export class Box {
     constructor(x, y, z) {
         this.halves = [x / 2, y / 2, z / 2];
         this.faces = [y * z, x * z, x * y];
+        this.height = z;
         this.reach = hypot(...this.halves);
         this.largestArea = hypot(...this.faces);
     }
@@ -54,6 +56,7 @@ export class Cylinder {
      */
     constructor(radius, height) {
         this.radius = radius;
+        this.height = height;
         this.half = height / 2;
         this.top = PI * radius ** 2;
         this.side = 2 * radius * height;
@@ -87,6 +90,7 @@ export class Sphere {
     /** @param {number} radius */
     constructor(radius) {
         this.radius = this.reach = radius;
+        this.height = 2 * radius;
         this.largestArea = PI * radius ** 2;
     }
 

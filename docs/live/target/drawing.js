@@ -5,7 +5,7 @@
 
 import { Clock } from "../clock.js";
 import { colourOf } from "../energy_colours.js";
-import { count } from "../words.js";
+import { count, duration, oneIn } from "../words.js";
 import { NUMBERS_OF_HIT } from "./aim.js";
 import { ENLARGED, isSeen, outlineOf, projected } from "./isometric.js";
 
@@ -31,7 +31,9 @@ export class Drawing {
         /** @type {Float32Array} */
         this.hits = new Float32Array();
         this.rate = 0;
-        this.seconds = 0;
+        this.pace = 1; // seconds of theirs in one of the reader's
+        this.seconds = 0; // of the reader's
+        this.elapsed = 0; // of the muons'
         this.next = 0; // when the next muon arrives
         this.arrived = 0;
         /** @type {Arrival[]} the last ones */
@@ -53,6 +55,16 @@ export class Drawing {
         this.rewind();
     }
 
+    /**
+     * Let time go faster, or as it does.
+     *
+     * @param {number} pace seconds of the muons in one of the reader's
+     */
+    hurry(pace) {
+        this.pace = pace;
+        this.next = this.seconds + this.wait();
+    }
+
     play() {
         if (this.clock.playing) return;
         this.clock.play();
@@ -66,7 +78,7 @@ export class Drawing {
     }
 
     rewind() {
-        this.seconds = 0;
+        this.seconds = this.elapsed = 0;
         this.arrived = 0;
         this.arrivals = [];
         this.next = this.wait();
@@ -77,6 +89,7 @@ export class Drawing {
     /** @param {number} seconds */
     advance(seconds) {
         this.seconds += seconds;
+        this.elapsed += seconds * this.pace;
         let number = 0;
         while (this.next < this.seconds) {
             this.next += this.wait();
@@ -88,7 +101,7 @@ export class Drawing {
 
     /** How long it is to the next muon: they are independent, a Poisson process. */
     wait() {
-        return -Math.log(1 - Math.random()) / this.rate;
+        return -Math.log(1 - Math.random()) / (this.rate * this.pace);
     }
 
     /** @param {number} number of muons that come now */
@@ -185,7 +198,7 @@ export class Drawing {
      */
     paintWays(scale, pixel) {
         const { context } = this;
-        const flash = Math.min(FLASH, SHINING / this.rate);
+        const flash = Math.min(FLASH, SHINING / (this.rate * this.pace));
         for (const { way, place, colour, isSeen, time } of this.arrivals.slice(
             this.clock.playing ? -SHINING : -STILL,
         )) {
@@ -210,7 +223,9 @@ export class Drawing {
         context.globalAlpha = 1;
         context.fillStyle = "#ffffffd0";
         context.font = `${13 * pixel}px sans-serif`;
-        const text = `${count(this.arrived)} muons in ${this.seconds.toFixed(1)} s`;
+        const time = this.elapsed < 60 ? `${this.elapsed.toFixed(1)} s` : duration(this.elapsed);
+        const rarity = this.pace === 1 ? oneIn(this.rate) : "";
+        const text = `${count(this.arrived)} muons in ${time}${rarity}`;
         context.fillText(text, 12 * pixel - canvas.width / 2, canvas.height / 2 - 12 * pixel);
     }
 }

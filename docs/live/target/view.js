@@ -2,9 +2,10 @@
 
 import { Engine } from "../engine.js";
 import { newSeed } from "../latents.js";
-import { place } from "../models.js";
+import { optionsOf, place } from "../models.js";
+import { Pace } from "../pace.js";
 import { element } from "../page.js";
-import { readSize, rounded } from "../words.js";
+import { often, oneIn, periodOf, readSize, rounded } from "../words.js";
 import { bodyOf, KINDS } from "./bodies.js";
 import { Drawing } from "./drawing.js";
 
@@ -13,20 +14,24 @@ const figure = element("target-figure", HTMLElement);
 const choice = element("target", HTMLSelectElement);
 const fields = [1, 2, 3].map((number) => element(`size-${number}`, HTMLInputElement));
 const note = element("target-note", HTMLElement);
+const noteOfEnds = element("target-ends", HTMLElement);
 const motion = element("target-motion", HTMLButtonElement);
 const canvas = element("target-drawing", HTMLCanvasElement);
 const again = element("target-again", HTMLElement);
 const command = element("target-command", HTMLElement);
+const duration = element("target-time", HTMLElement);
 
 const NOTHING = "null";
 
 /** @typedef {import("../models.js").Family} Family */
+/** @typedef {import("./aim.js").End} End */
 /** @typedef {import("./bodies.js").Kind} Kind */
 /** @typedef {{family: Family, kind: Kind, sizes: number[]}} Wanted */
 
 export class TargetView {
     constructor() {
         this.drawing = new Drawing(canvas);
+        this.pace = new Pace(element("target-pace", HTMLSelectElement), () => this.drawing.hurry(this.pace.factor));
         /** @type {Engine | undefined} its own, so that a run does not wait for it */
         this.engine = undefined;
         /** @type {Family | undefined} */
@@ -121,8 +126,8 @@ export class TargetView {
                 const { family, kind, sizes } = JSON.parse(wanted);
                 if (!this.engine) say("Getting the muons ready …");
                 this.engine ??= new Engine();
-                const { hz, hits } = await this.engine.ask("aim", family, kind, sizes, newSeed());
-                if (this.wanted === wanted) this.show({ family, kind, sizes }, hz, hits);
+                const found = await this.engine.ask("aim", family, kind, sizes, newSeed());
+                if (this.wanted === wanted) this.show({ family, kind, sizes }, found);
             }
         } catch (error) {
             this.wanted = NOTHING;
@@ -136,18 +141,40 @@ export class TargetView {
 
     /**
      * @param {Wanted} wanted
-     * @param {number} hz
-     * @param {Float32Array} hits
+     * @param {Awaited<ReturnType<import("../worker.js").Answers["aim"]>>} found
      */
-    show({ family, kind, sizes }, hz, hits) {
+    show({ family, kind, sizes }, { hz, hits, ends }) {
+        this.pace.offer(hz);
+        this.drawing.hurry(this.pace.factor);
         this.drawing.show(bodyOf(kind, sizes), hz, hits);
         canvas.ariaLabel = `A ${kind} of ${sizes.join(" × ")} m, with points where muons enter it`;
-        say(`${rounded(hz)} muons a second enter it ${place(family.depth_m)}.`);
-        command.textContent =
-            `deepmuon-gen --depth ${family.depth_m} --architecture ${family.architecture} ` +
-            `--${kind} ${sizes.join(" ")} --live-time 60 -o muons.h5`;
+        say(`${often(hz)} enter it ${place(family)}${oneIn(hz)}.`);
+        if (ends) noteOfEnds.textContent = warningOf(kind, family, ends);
+        const { seconds, name } = periodOf(hz);
+        const time = Math.max(60, seconds);
+        duration.textContent = time === 60 ? "a minute" : name;
+        command.textContent = `deepmuon-gen ${optionsOf(family)} --${kind} ${sizes.join(" ")} --live-time ${time} -o muons.h5`;
         again.hidden = false;
     }
+}
+
+/**
+ * That the muons at the top of a body are others than at its foot.
+ *
+ * @param {Kind} kind
+ * @param {Family} family
+ * @param {[End, End]} ends
+ */
+function warningOf(kind, { depth_m }, ends) {
+    const { name, seconds } = periodOf(ends[1].flux);
+    const [top, foot] = ends.map((end) => ({
+        depth: Number(end.depth_m.toPrecision(6)),
+        flux: rounded(end.flux * seconds),
+    }));
+    return (
+        `The ${kind} gets the muons of its centre, at ${depth_m} m, all over: ${top.flux} ${name} and m² come to ` +
+        `its top, at ${top.depth} m, and ${foot.flux} to its foot, at ${foot.depth} m.`
+    );
 }
 
 /** @param {string} text */
@@ -166,5 +193,6 @@ function isSize(text) {
  */
 function say(text, isWrong = false) {
     note.textContent = text;
+    noteOfEnds.textContent = "";
     note.classList.toggle("wrong", isWrong);
 }

@@ -17,10 +17,10 @@ import numpy as np
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.formats.notes import FIRST_NOTE, notes, said, understood
 from deepmuon_runtime.formats.packing import opened_bytes
-from deepmuon_runtime.formats.source import Columns, Source, column_types
+from deepmuon_runtime.formats.source import Columns, Source
 from deepmuon_runtime.formats.writing import StreamWriter
 from deepmuon_runtime.muon_file.checksum import crc32, unlike
-from deepmuon_runtime.muon_file.format import CHECKSUM
+from deepmuon_runtime.muon_file.format import CHECKSUM, column_types
 
 __all__ = ["UNITS", "CsvWriter", "PackedCsvWriter", "bytes_per_muon", "csv_pieces", "is_csv", "opened_csv"]
 

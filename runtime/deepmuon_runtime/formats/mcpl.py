@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.formats.notes import COLUMN_NAMES, notes, said, understood
 from deepmuon_runtime.formats.packing import opened_bytes
-from deepmuon_runtime.formats.source import PIECE, Columns, Source, column_types
+from deepmuon_runtime.formats.source import PIECE, Columns, Source
 from deepmuon_runtime.formats.writing import StreamWriter
 from deepmuon_runtime.muon_file.checksum import crc32, unlike
-from deepmuon_runtime.muon_file.format import CHECKSUM, PLACE
+from deepmuon_runtime.muon_file.format import CHECKSUM, PLACE, column_types
 
 __all__ = ["MAGIC", "ROUNDING", "McplWriter", "PackedMcplWriter", "bytes_per_muon", "opened_mcpl"]
 

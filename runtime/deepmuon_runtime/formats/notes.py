@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.model.metadata import is_name
 from deepmuon_runtime.muon_file.attributes import ALWAYS, LIVE_TIMES, checksum_defects, value_defects
 from deepmuon_runtime.muon_file.checksum import attributes_crc32
 from deepmuon_runtime.muon_file.format import ATTRIBUTES_CHECKSUM, CHECKSUM, FORMAT, FORMAT_VERSION, python_value
@@ -23,6 +24,7 @@ COLUMN_NAMES = "columns"
 FIRST_NOTE = f'format = "{FORMAT}"'
 """The first of all lines, by which a file of ours is known."""
 
+_NOT_OF_MUONS = ("format", "format_version", COLUMN_NAMES, ATTRIBUTES_CHECKSUM, CHECKSUM)
 _KNOWN_AT_THE_END = ("count", *LIVE_TIMES, ATTRIBUTES_CHECKSUM, CHECKSUM)
 _WIDTH = 24  # of any float64 in JSON, and of any 64-bit number
 
@@ -36,10 +38,25 @@ def said(attributes: Mapping[str, Any], **more: object) -> dict[str, Any]:
         Those of a muon file.
     more
         For instance `crc32`, of what follows the header.
+
+    Raises
+    ------
+    RefusedError
+        If an attribute has a name by which it would not be read back.
     """
-    plain = {name: python_value(value) for name, value in attributes.items()}
+    for name in attributes:
+        if not is_name(name) or " = " in name or name in _NOT_OF_MUONS:
+            raise RefusedError(f"the attribute {ascii(name)[:80]} has a name that no other format than HDF5 can hold")
+    plain = {name: _decoded(python_value(value)) for name, value in attributes.items()}
     checked = {ATTRIBUTES_CHECKSUM: attributes_crc32(plain)}
     return {"format": FORMAT, "format_version": FORMAT_VERSION, **plain, **checked, **more}
+
+
+def _decoded(value: Any) -> Any:
+    """Return a value with its texts as such, which HDF5 may give as bytes."""
+    if isinstance(value, list):
+        return [_decoded(item) for item in value]
+    return value.decode("utf-8", "backslashreplace") if isinstance(value, bytes) else value
 
 
 def notes(statements: Mapping[str, Any]) -> list[str]:

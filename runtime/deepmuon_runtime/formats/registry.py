@@ -15,7 +15,7 @@ from deepmuon_runtime.formats.packing import opened_bytes
 from deepmuon_runtime.formats.source import PIECE, Source
 from deepmuon_runtime.formats.writing import Writer
 from deepmuon_runtime.muon_file.format import bytes_per_muon
-from deepmuon_runtime.muon_file.output import check_muon_output
+from deepmuon_runtime.muon_file.output import check_muon_output, refuse_stdout
 from deepmuon_runtime.muon_file.reader import opened
 from deepmuon_runtime.muon_file.writer import MuonWriter
 
@@ -70,6 +70,7 @@ class Format:
     def check_output(self, path: str | Path, overwrite: bool = False, inputs: Iterable[str | Path] = ()) -> Path:
         """Tell whether muons can be written at `path`; see `deepmuon_runtime.files.output.check_output`."""
         self.check_needed()
+        refuse_stdout(path)
         return (check_muon_output if self is HDF5 else check_output)(path, overwrite, inputs)
 
 

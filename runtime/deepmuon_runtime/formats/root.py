@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import RefusedError, reason
 from deepmuon_runtime.formats.notes import COLUMN_NAMES, said, understood
-from deepmuon_runtime.formats.source import PIECE, Columns, Source, column_types
+from deepmuon_runtime.formats.source import PIECE, Columns, Source
 from deepmuon_runtime.formats.writing import Writer
 from deepmuon_runtime.muon_file.checksum import crc32, unlike
-from deepmuon_runtime.muon_file.format import CHECKSUM, bytes_per_muon
+from deepmuon_runtime.muon_file.format import CHECKSUM, bytes_per_muon, column_types
 
 __all__ = ["MAGIC", "NEEDED", "RootWriter", "bytes_in_tree", "opened_root"]
 
@@ -46,16 +46,19 @@ class RootWriter(Writer):
     def _begin(self) -> None:
         import uproot
 
+        said(self._description.of(0))  # what can't be said is refused now, and not at the end
         self._root = uproot.recreate(_Kept(self._file), compression=None)  # random numbers hardly shrink
         self._tree = self._root.mktree(TREE, {name: _in_tree(dtype) for name, dtype in self._types.items()})
         self._checksums = dict.fromkeys(self._types, 0)
         self._waiting: list[Columns] = []
         self._waiting_count = 0
+        self._flushed = 0
 
     def _append(self, columns: Columns) -> None:
         for name, values in columns.items():
             self._checksums[name] = crc32(values.data, self._checksums[name])
-        self._waiting.append(columns)
+        # Copies: whoever gave the columns may fill their memory again.
+        self._waiting.append({name: columns[name].astype(_in_tree(dtype)) for name, dtype in self._types.items()})
         self._waiting_count += len(columns["pdg_id"])
         if self._waiting_count >= BASKET:
             self._extend()
@@ -73,16 +76,9 @@ class RootWriter(Writer):
             return
         waiting, self._waiting = self._waiting, []
         self._waiting_count = 0
-        self._tree.extend(
-            {
-                name: np.concatenate([columns[name] for columns in waiting]).astype(_in_tree(dtype), copy=False)
-                for name, dtype in self._types.items()
-            }
-        )
+        self._tree.extend({name: np.concatenate([columns[name] for columns in waiting]) for name in self._types})
         self._flush.wrote(os.fstat(self._file.fileno()).st_size - self._flushed)
         self._flushed = os.fstat(self._file.fileno()).st_size
-
-    _flushed = 0
 
 
 class _Kept:
@@ -113,23 +109,29 @@ def opened_root(path: str | Path) -> Iterator[Source]:
     """
     import uproot
 
-    with _errors(path), uproot.open(path) as file:
-        names = file.keys(cycle=False)
-        if TREE not in names or TEXT not in names:
-            raise RefusedError(
-                f"{path} was not written by DeepMuon: it lacks the tree {TREE} or the text {TEXT} (deepmuon-train "
-                "convert reads others)"
-            )
-        stated = json.loads(str(file[TEXT]))
-        if not isinstance(stated, dict):
-            raise RefusedError(f"{path} is damaged: its text {TEXT} is none of ours")
-        attributes, more = understood(stated, path)
-        types, tree = column_types(more.get(COLUMN_NAMES), path), file[TREE]
-        if tree.num_entries != attributes["count"]:
-            raise RefusedError(f"{path} has {tree.num_entries} muons, and says that it has {attributes['count']}")
-        if tree.typenames() != {name: _TYPES[_in_tree(dtype).str[1:]] for name, dtype in types.items()}:
-            raise RefusedError(f"{path} is damaged: its branches are {tree.typenames()}")
-        yield Source(attributes, tuple(types), lambda: _pieces(path, tree, types, more.get(CHECKSUM)))
+    with ExitStack() as stack:
+        with _errors(path):  # not around what is made of the muons, whose errors are none of this file
+            source = _source(stack.enter_context(uproot.open(path)), path)
+        yield source
+
+
+def _source(file: Any, path: str | Path) -> Source:
+    names = file.keys(cycle=False)
+    if TREE not in names or TEXT not in names:
+        raise RefusedError(
+            f"{path} was not written by DeepMuon: it lacks the tree {TREE} or the text {TEXT} (deepmuon-train "
+            "convert reads others)"
+        )
+    stated = json.loads(str(file[TEXT]))
+    if not isinstance(stated, dict):
+        raise RefusedError(f"{path} is damaged: its text {TEXT} is none of ours")
+    attributes, more = understood(stated, path)
+    types, tree = column_types(more.get(COLUMN_NAMES), path), file[TREE]
+    if tree.num_entries != attributes["count"]:
+        raise RefusedError(f"{path} has {tree.num_entries} muons, and says that it has {attributes['count']}")
+    if tree.typenames() != {name: _TYPES[_in_tree(dtype).str[1:]] for name, dtype in types.items()}:
+        raise RefusedError(f"{path} is damaged: its branches are {tree.typenames()}")
+    return Source(attributes, tuple(types), lambda: _pieces(path, tree, types, more.get(CHECKSUM)))
 
 
 _TYPES = {"f4": "float", "f8": "double", "i4": "int32_t"}

@@ -6,13 +6,9 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
-from deepmuon_runtime.errors import RefusedError
-from deepmuon_runtime.muon_file.format import COLUMNS, OPTIONAL_COLUMNS
-
-__all__ = ["PIECE", "Columns", "Source", "column_types"]
+__all__ = ["PIECE", "Columns", "Source"]
 
 PIECE = 1 << 17
 """Muons that are in memory at once, about."""
@@ -39,14 +35,3 @@ class Source:
     attributes: dict[str, Any]
     names: tuple[str, ...]
     pieces: Callable[[], Iterator[Columns]]
-
-
-def column_types(names: object, path: object) -> dict[str, np.dtype[Any]]:
-    """Return the types of named columns in the order of a muon file; RefusedError unless they may be those of one."""
-    every = {**COLUMNS, **OPTIONAL_COLUMNS}
-    if not isinstance(names, (list, tuple)) or not all(isinstance(name, str) for name in names):
-        raise RefusedError(f"{path} does not say which columns it has")
-    found = {name: dtype for name, (dtype, _) in every.items() if name in names}
-    if len(found) != len(names) or not COLUMNS.keys() <= found.keys() or len(found.keys() & set("xyz")) not in (0, 3):
-        raise RefusedError(f"{path} has the columns {', '.join(names)[:200]}, which are none of a muon file")
-    return found

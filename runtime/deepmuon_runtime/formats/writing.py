@@ -14,13 +14,12 @@ from numpy.typing import ArrayLike
 
 from deepmuon_runtime.errors import RefusedError, reason
 from deepmuon_runtime.files.early_flush import EarlyFlush
-from deepmuon_runtime.files.output import check_output
 from deepmuon_runtime.files.partial import PartialFile
 from deepmuon_runtime.formats.packing import packed, wrapped
 from deepmuon_runtime.formats.source import Columns
 from deepmuon_runtime.muon_file.attributes import Description
 from deepmuon_runtime.muon_file.checksum import crc32
-from deepmuon_runtime.muon_file.format import COLUMNS, OPTIONAL_COLUMNS
+from deepmuon_runtime.muon_file.format import COLUMNS, column_types
 from deepmuon_runtime.muons import Muons
 
 __all__ = ["StreamWriter", "Writer"]
@@ -53,16 +52,11 @@ class Writer(ABC):
         *,
         optional: Collection[str] = (),
     ) -> None:
-        check_output(path, overwrite)
         self._partial = PartialFile(path, overwrite)
         self.path = self._partial.target
         self.count = 0
         self._description = Description(path, attributes)
-        self._types = {
-            name: dtype
-            for name, (dtype, _) in {**COLUMNS, **OPTIONAL_COLUMNS}.items()
-            if name in COLUMNS or name in optional
-        }
+        self._types = column_types([*COLUMNS, *optional], path)
 
     def __enter__(self) -> Writer:
         """Create the temporary file."""

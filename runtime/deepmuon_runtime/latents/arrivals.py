@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from collections.abc import Iterator
 from functools import cache
 from itertools import accumulate
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,12 +43,14 @@ class Arrivals:
 
     Attributes
     ----------
+    seed, stream : int
+        As given.
     count : int
         How many there are before the end.
     """
 
     def __init__(self, rate: float, seed: int, stream: int, live_time: float) -> None:
-        self._seed, self._stream = seed, stream
+        self.seed, self.stream = seed, stream
         self._slot = MEAN / rate
         last = math.floor(live_time / self._slot)
         in_groups = [int(self._counts(group).sum()) for group in range(last // GROUP)]
@@ -64,20 +68,40 @@ class Arrivals:
             Which muons, the next after the first.
         """
         found = [np.empty(0)]
+        for slot, count, first in self.slots(numbers):
+            found.append(self._times(slot, count)[max(numbers.start - first, 0) : numbers.stop - first])
+        return np.concatenate(found)
+
+    def slots(self, numbers: range) -> Iterator[tuple[int, int, int]]:
+        """Yield the slots in which muons come, in order: which, how many muons it has, and the number of its first.
+
+        Parameters
+        ----------
+        numbers
+            Which muons, the next after the first.
+        """
         group = bisect_right(self._before, numbers.start) - 1
         first = self._before[group]  # the number of the next slot's first muon
         while first < numbers.stop:
             for slot, count in enumerate(self._counts(group).tolist(), start=group * GROUP):
                 if first < numbers.stop and first + count > numbers.start:
-                    times = self._times(slot, count)
-                    found.append(times[max(numbers.start - first, 0) : numbers.stop - first])
+                    yield slot, count, first
                 first += count
             group += 1
-        return np.concatenate(found)
+
+    def seconds(self, slot: int | NDArray[Any], place: NDArray[Any]) -> NDArray[np.float64]:
+        """Return times from slots, and places in them of 0 to 2^53 - 1; arrays may be CuPy's."""
+        times: NDArray[np.float64] = (slot + place * 2.0**-53) * self._slot
+        return times
+
+    @staticmethod
+    def first_word(slot: int) -> int:
+        """Return which word of its row makes a slot's first time, before they are sorted."""
+        return slot * ROW
 
     def _counts(self, group: int) -> NDArray[np.int64]:
         """Return how many muons come in each slot of a group: int64 [GROUP]."""
-        uniform = (words(self._seed, self._stream, FOR_COUNT, group * GROUP, GROUP) >> np.uint64(11)) * 2.0**-53
+        uniform = (words(self.seed, self.stream, FOR_COUNT, group * GROUP, GROUP) >> np.uint64(11)) * 2.0**-53
         lowest, cumulative = _distribution()
         return lowest + np.searchsorted(cumulative, uniform, side="right")
 
@@ -85,8 +109,8 @@ class Arrivals:
         """Return the times of a slot's muons, sorted: float64 [count]."""
         if count is None:
             count = int(self._counts(slot // GROUP)[slot % GROUP])
-        place = np.sort(words(self._seed, self._stream, FOR_TIMES, slot * ROW, count)) >> np.uint64(11)
-        return np.asarray((slot + place * 2.0**-53) * self._slot, np.float64)
+        moments = words(self.seed, self.stream, FOR_TIMES, self.first_word(slot), count)
+        return self.seconds(slot, np.sort(moments) >> np.uint64(11))
 
 
 @cache

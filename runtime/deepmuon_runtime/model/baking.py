@@ -43,8 +43,8 @@ def bake(contents: bytes, depth_m: float, surface: int = HORIZONTAL_PLANE, name:
     Raises
     ------
     RefusedError
-        As `checked_model` and `load_model`, or if the nodes whose names begin with `depth/` need latents or
-        make other than float32, int32 or int64.
+        As `checked_model` and `load_model`, or if the nodes whose names begin with `depth/` need latents,
+        make other than float32, int32 or int64, or are not there.
     """
     placed, family = checked_model(contents, name, depth_m, surface)
     _, model, _ = load_model(placed, family, "cpu")
@@ -88,6 +88,10 @@ def _baked(graph: memoryview, model: bytes, name: str) -> bytes:
     needed = set(outputs).union(*(node.inputs for node in kept))
     made = [output for node in nodes if node.name.startswith(DEPTH) for output in node.outputs]
     ends = [end for end in made if end in needed]
+    if not ends:
+        raise RefusedError(
+            f"{name} can't be baked: no node that its muons or rate need has a name that begins with {DEPTH}"
+        )
     values = dict(zip(ends, _run(graph, model, nodes, ends, name), strict=True))
     tables = [_tensor(_stored(end, outputs), value, name) for end, value in values.items()]
     given = [_identity(end) for end in ends if end in outputs]

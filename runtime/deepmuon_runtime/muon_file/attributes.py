@@ -105,7 +105,7 @@ WHERE_KNOWN = {
     "zenith_min_degrees": ZENITH,
     "zenith_max_degrees": ZENITH,
     "fraction_kept": _Rule(lambda x: _is_number(x) and 0 < x <= 1, "a number above 0 and at most 1"),
-    "target": TEXT,
+    "target": NAME,
     "target_size_m": SIZES,
     "target_rate_hz": NOT_NEGATIVE,
     "target_rate_uncertainty_hz": NOT_NEGATIVE,

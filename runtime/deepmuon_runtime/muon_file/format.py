@@ -36,6 +36,7 @@ __all__ = [
     "PLACE",
     "bytes_per_muon",
     "check_format",
+    "column_types",
     "python_value",
     "stated",
 ]
@@ -79,6 +80,21 @@ def bytes_per_muon(columns: Iterable[str]) -> int:
 
 BYTES_PER_MUON = bytes_per_muon(COLUMNS)
 """Bytes of a muon without optional columns."""
+
+
+def column_types(names: object, path: object) -> dict[str, np.dtype[Any]]:
+    """Return the types of named columns in the order of a muon file; RefusedError unless they may be those of one."""
+    every = {**COLUMNS, **OPTIONAL_COLUMNS}
+    if not isinstance(names, (list, tuple)) or not all(isinstance(name, str) for name in names):
+        raise RefusedError(f"{path} does not say which columns it has")
+    found = {name: dtype for name, (dtype, _) in every.items() if name in names}
+    if (
+        len(found) != len(names)
+        or not COLUMNS.keys() <= found.keys()
+        or len(found.keys() & set(PLACE)) not in (0, len(PLACE))
+    ):
+        raise RefusedError(f"{path} has the columns {', '.join(names)[:200]}, which are none of a muon file")
+    return found
 
 
 def check_format(file: h5py.File, path: str | Path) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.files.output import check_output
 
-__all__ = ["check_muon_output"]
+__all__ = ["check_muon_output", "refuse_stdout"]
 
 BY_CONVERT = "deepmuon-convert {stem}.h5 {name}"
 AS_CSV = "deepmuon-convert {stem}.h5 {stem}.csv"
@@ -17,7 +17,9 @@ OTHER_FORMATS = {
     ".csv": ("text", BY_CONVERT),
     ".txt": ("text", AS_CSV),
     ".dat": ("text", AS_CSV),
-    ".gz": ("a packed file", BY_CONVERT),
+    ".csv.gz": ("packed text", BY_CONVERT),
+    ".mcpl.gz": ("packed MCPL", BY_CONVERT),
+    ".gz": ("a packed file", "deepmuon-convert {stem}.h5 {stem}.csv.gz"),
     ".zip": ("a compressed file", "compress that"),
     ".root": ("ROOT", BY_CONVERT),
     ".parquet": ("Parquet", BY_PYTHON),
@@ -31,7 +33,16 @@ OTHER_FORMATS = {
     ".pdf": ("a picture", "deepmuon-plot {stem}.h5 -o {name}"),
     ".svg": ("a picture", "deepmuon-plot {stem}.h5 -o {name}"),
 }
-"""What the ends of names promise that is not HDF5, and how to come to it."""
+"""What the ends of names promise that is not HDF5, and how to come to it; a longer end before its own."""
+
+
+def refuse_stdout(path: str | Path) -> None:
+    """Refuse -, which stands for stdout elsewhere: no file of muons can go there."""
+    if str(path) == "-":
+        raise RefusedError(
+            "- is no name of a muon file, which can't go to stdout: give one, as in -o muons.h5, and then write it as "
+            "text by deepmuon-convert muons.h5 -"
+        )
 
 
 def check_muon_output(path: str | Path, overwrite: bool = False, inputs: Iterable[str | Path] = ()) -> Path:
@@ -53,13 +64,9 @@ def check_muon_output(path: str | Path, overwrite: bool = False, inputs: Iterabl
     """
     check_output(path, True, inputs)  # first of all: what is read is never replaced, whatever its name
     name = Path(path).name
-    if str(path) == "-":
-        raise RefusedError(
-            "- is no name of a muon file, which can't go to stdout: give one, as in -o muons.h5, and then write it as "
-            "text by deepmuon-convert muons.h5 -"
-        )
-    ending = Path(name).suffix.lower()
-    if ending in OTHER_FORMATS:
+    refuse_stdout(path)
+    ending = next((ending for ending in OTHER_FORMATS if name.lower().endswith(ending)), None)
+    if ending is not None:
         form, way = OTHER_FORMATS[ending]
         stem = name[: -len(ending)]
         if ending == ".gz":

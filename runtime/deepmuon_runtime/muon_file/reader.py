@@ -247,7 +247,17 @@ def opened_file(path: str | Path) -> Iterator[h5py.File]:
         with h5py.File(path, "r") as file:
             yield file
     except READ_ERRORS as error:
-        raise RefusedError(f"{path} can't be read as a muon file: {reason(error)}") from error
+        raise RefusedError(f"{path} can't be read as a muon file: {_reason(path, error)}") from error
+
+
+def _reason(path: str | Path, error: BaseException) -> str:
+    """Return why a file can't be read; of one that is none of HDF5's, which command reads others."""
+    if isinstance(error, OSError) and not error.errno and not h5py.is_hdf5(path):
+        return (
+            "it is no HDF5; deepmuon-convert makes that of MCPL, ROOT and text that DeepMuon wrote, and deepmuon-train "
+            "convert of what others wrote"
+        )
+    return reason(error)
 
 
 @contextmanager

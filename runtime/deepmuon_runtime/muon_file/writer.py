@@ -28,6 +28,7 @@ from deepmuon_runtime.muon_file.format import (
     FORMAT_VERSION,
     OPTIONAL_COLUMNS,
     bytes_per_muon,
+    column_types,
     stated,
 )
 from deepmuon_runtime.muon_file.growing_column import GrowingColumn
@@ -70,8 +71,8 @@ class MuonWriter:
     Raises
     ------
     RefusedError
-        On construction and entry, if `path` can't be written, an attribute is missing or can't be what it is, or
-        SOURCE_DATE_EPOCH is no time.
+        On construction and entry, if `path` can't be written, an attribute is missing or can't be what it is, a file
+        has no such optional columns, as x without y, or SOURCE_DATE_EPOCH is no time.
     FailedError
         Later, if writing fails (disk full), or another process has written `path` meanwhile.
     """
@@ -92,7 +93,7 @@ class MuonWriter:
         self.path = self._partial.target
         self.count = 0
         self._description = Description(path, attributes)
-        self._types = {**COLUMNS, **{name: OPTIONAL_COLUMNS[name] for name in OPTIONAL_COLUMNS if name in optional}}
+        self._types = column_types([*COLUMNS, *optional], path)
         self._growing: dict[str, GrowingColumn] = {}
         self._columns: dict[str, h5py.Dataset] = {}  # complete ones, and their checksums
         self._checksums: dict[str, int] = {}
@@ -190,7 +191,7 @@ class MuonWriter:
     def _create_columns(self, first_length: int) -> None:
         chunk = min(max(first_length, SMALLEST_CHUNK), LARGEST_CHUNK)
         group = self._file.create_group("muons")
-        for name, (dtype, _) in self._types.items():
+        for name, dtype in self._types.items():
             self._growing[name] = GrowingColumn(group, name, dtype, chunk)
 
     def _refer(self, paths: Iterable[str | Path], progress: Callable[[int], object]) -> None:
@@ -204,7 +205,7 @@ class MuonWriter:
             return
         ends = np.cumsum([part.length for part in parts]).tolist()
         group = self._file.create_group("muons")
-        for name, (dtype, _) in self._types.items():
+        for name, dtype in self._types.items():
             sources = [Source(part.path, name, end - part.length, end) for part, end in zip(parts, ends, strict=True)]
             progress(0)
             self._columns[name] = create_virtual_column(group, name, dtype, sources)
@@ -231,7 +232,7 @@ class MuonWriter:
             growing.finish()
             self._columns[name], self._checksums[name] = growing.dataset, growing.checksum
         for name, column in self._columns.items():
-            column.attrs["units"] = self._types[name][1]
+            column.attrs["units"] = {**COLUMNS, **OPTIONAL_COLUMNS}[name][1]
             column.attrs[CHECKSUM] = np.uint32(self._checksums[name])
         self._file.attrs["format"] = FORMAT
         self._file.attrs["format_version"] = FORMAT_VERSION

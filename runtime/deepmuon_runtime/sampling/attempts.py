@@ -40,8 +40,9 @@ class Attempts:
 
     def __init__(self, drawing: Drawing, taken: float, piece: int) -> None:
         self._drawing = drawing
-        self._block = drawing.source.block_draws
-        self._per_draw = drawing.source.model.muons_per_draw
+        self._arrays = drawing.maker.arrays
+        self._block = drawing.maker.block_draws
+        self._per_draw = drawing.maker.model.muons_per_draw
         self._draws = piece // self._per_draw
         wanted = max(FEWEST, OF_RARE * taken * piece)
         while self._draws > 1 and self._draws * self._per_draw > wanted:
@@ -65,24 +66,24 @@ class Attempts:
         if len(muons) == self.muons:
             self._fill(muons, seed, number, stopped)
             return
-        made = Muons.empty(self.muons, has_place=self._drawing.target is not None)
+        made = self._drawing.empty(self.muons)
         self._fill(made, seed, number, stopped)
         for name, column in made.columns.items():
             muons.columns[name][:] = column[skipped : skipped + len(muons)]
 
     def _fill(self, made: Muons, seed: int, number: int, stopped: Callable[[], object]) -> None:
         """Make all muons of a unit."""
-        have = np.zeros(self._draws, np.int64)  # muons that each draw has
+        have = self._arrays.zeros(self._draws, np.int64)  # muons that each draw has
         first = number * self._draws
         for start in range(0, self._draws, self._block):
             stopped()
-            places = np.arange(start, min(start + self._block, self._draws))
+            places = self._arrays.arange(start, min(start + self._block, self._draws), dtype=np.int64)
             draws = range(first + start, first + start + len(places))
             if self._per_draw == 1:  # made where they shall be: what is rejected gives way to a later attempt
                 part = slice(start, start + len(places))
                 have[part] = self._drawing.first(made[part], seed, draws)
             else:
-                tried = self._empty(len(draws))
+                tried = self._drawing.empty(len(draws) * self._per_draw)
                 self._keep(made, have, places, tried, self._drawing.first(tried, seed, draws))
         attempt, together = 1, 1
         wanting = np.flatnonzero(have < self._per_draw)
@@ -90,16 +91,13 @@ class Attempts:
             for start in range(0, len(wanting), self._block // together):
                 stopped()
                 places = wanting[start : start + self._block // together]
-                attempts = np.tile(np.arange(attempt, attempt + together), len(places))
-                tried = self._empty(len(attempts))
+                attempts = np.tile(self._arrays.arange(attempt, attempt + together, dtype=np.int64), len(places))
+                tried = self._drawing.empty(len(attempts) * self._per_draw)
                 taken = self._drawing.again(tried, seed, attempts, np.repeat(first + places, together))
                 self._keep(made, have, places, tried, taken)
             wanting = wanting[have[wanting] < self._per_draw]
             attempt += together
             together = min(2 * together, max(1, self._block // max(1, len(wanting))))
-
-    def _empty(self, draws: int) -> Muons:
-        return Muons.empty(draws * self._per_draw, has_place=self._drawing.target is not None)
 
     def _keep(
         self,

@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime.cuts import Cuts
-from deepmuon_runtime.latents.again import numbers_again
-from deepmuon_runtime.latents.philox import FOR_POSITIONS, fill_latents
+from deepmuon_runtime.latents.philox import FOR_POSITIONS
 from deepmuon_runtime.muons import Muons
 from deepmuon_runtime.sampling.energy_cut import EnergyCut
-from deepmuon_runtime.sampling.source import Source
+from deepmuon_runtime.sampling.maker import Maker
 from deepmuon_runtime.targets.target import Target
 
 __all__ = ["NUMBERS_OF_PLACE", "Drawing"]
@@ -20,18 +19,24 @@ NUMBERS_OF_PLACE = 3
 
 
 class Drawing:
-    """Draws of a source, put on a target.
+    """Draws of a model, put on a target: on the processor, or on a GPU.
 
     Parameters
     ----------
-    source, cuts, target
+    maker
+        What makes them, and all arrays.
+    cuts, target
         What is asked.
     energy
         Where it is given, all muons are of its energies.
     """
 
-    def __init__(self, source: Source, cuts: Cuts, target: Target | None, energy: EnergyCut | None) -> None:
-        self.source, self.cuts, self.target, self.energy = source, cuts, target, energy
+    def __init__(self, maker: Maker, cuts: Cuts, target: Target | None, energy: EnergyCut | None) -> None:
+        self.maker, self.cuts, self.target, self.energy = maker, cuts, target, energy
+
+    def empty(self, n: int) -> Muons:
+        """Return n muons whose columns are yet to be filled, with places where there is a target."""
+        return self.maker.empty(n, has_place=self.target is not None)
 
     def first(self, muons: Muons, seed: int, draws: range, skipped: int = 0) -> NDArray[np.bool_]:
         """Make the first attempt of consecutive draws, at most those of a block.
@@ -51,21 +56,17 @@ class Drawing:
         -------
         Which are taken: bool [n].
         """
-        source, model = self.source, self.source.model
-        is_block = len(draws) == source.block_draws
-        latent = source.block_latents if is_block else np.empty((len(draws), model.latent_size), np.float32)
-        fill_latents(latent, seed, draws.start, model.stream)
+        maker = self.maker
+        latent = maker.latents(len(draws))
+        maker.fill_latents(latent, seed, draws.start)
         if self.energy is not None:
             self.energy.squeeze(latent)
-        if is_block:
-            source.run_block(muons, skipped)
-        else:
-            source.run(latent, muons)
-        first = draws.start * model.muons_per_draw + skipped
+        maker.run(latent, muons, skipped)
+        first = draws.start * maker.model.muons_per_draw + skipped
         numbers = None
         if self.target is not None:
-            numbers = np.empty((len(muons), NUMBERS_OF_PLACE), np.float32)
-            fill_latents(numbers, seed, first, model.stream, purpose=FOR_POSITIONS)
+            numbers = maker.arrays.empty((len(muons), NUMBERS_OF_PLACE), np.float32)
+            maker.fill_latents(numbers, seed, first, FOR_POSITIONS)
         return self._taken(muons, first, numbers)
 
     def again(
@@ -86,14 +87,14 @@ class Drawing:
         -------
         Which are taken: bool [n].
         """
-        model = self.source.model
+        maker, model = self.maker, self.maker.model
         size = model.latent_size
         places = 0 if self.target is None else NUMBERS_OF_PLACE * model.muons_per_draw
-        numbers = numbers_again(seed, model.stream, attempts, draws, size + places)
-        latent = np.ascontiguousarray(numbers[:, :size])
+        numbers = maker.numbers_again(seed, attempts, draws, size + places)
+        latent = np.ascontiguousarray(numbers[:, :size], like=numbers)
         if self.energy is not None:
             self.energy.squeeze(latent)
-        self.source.run(latent, muons)
+        maker.run(latent, muons)
         of_places = numbers[:, size:].reshape(-1, NUMBERS_OF_PLACE) if places else None
         return self._taken(muons, int(draws[0]) * model.muons_per_draw, of_places)
 
@@ -101,7 +102,7 @@ class Drawing:
         """Put muons on the target, and tell which are taken."""
         if self.energy is not None:
             self.energy.clamp(muons)
-        self.source.check(muons, first)
+        self.maker.check(muons, first)
         taken = self.cuts.keeps(muons)
         if self.target is not None and numbers is not None:
             hits, *place = self.target.enters(muons.u, muons.v, muons.w, numbers)

@@ -20,7 +20,7 @@ from deepmuon_runtime.latents.philox import FOR_LATENTS, FOR_POSITIONS, fill_lat
 from deepmuon_runtime.muons import Muons
 from deepmuon_runtime.sampling.drawing import NUMBERS_OF_PLACE
 from deepmuon_runtime.sampling.energy_cut import EnergyCut
-from deepmuon_runtime.sampling.source import Source
+from deepmuon_runtime.sampling.source import Source, block_draws
 from deepmuon_runtime.targets.target import Target
 
 __all__ = ["Integral", "integral"]
@@ -67,10 +67,10 @@ def integral(
     """
     model = source.model
     is_even = model.muons_per_draw == 1 and model.latent_size <= FEW_LATENTS
-    rows = source.block_draws
+    rows = block_draws(model, "cpu")  # on every device the same points: the times of a live time go by the rate
     sums = np.zeros(SHIFTS)
     done = 0  # draws of each shift
-    made = Muons.empty(source.block_muons)
+    made = Muons.empty(rows * model.muons_per_draw)
     while True:
         for shift in range(SHIFTS):
             stopped()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from deepmuon_runtime.cuts import Cuts
@@ -16,11 +16,12 @@ from deepmuon_runtime.sampling.attempts import Attempts
 from deepmuon_runtime.sampling.drawing import Drawing
 from deepmuon_runtime.sampling.energy_cut import EnergyCut
 from deepmuon_runtime.sampling.integration import Integral, integral
+from deepmuon_runtime.sampling.maker import Maker
 from deepmuon_runtime.sampling.source import Source
 from deepmuon_runtime.targets.target import Target
 
 if TYPE_CHECKING:
-    from deepmuon_runtime.cuda.blocks import DeviceBlocks
+    from deepmuon_runtime.cuda.maker import DeviceMaker
 
 __all__ = ["Rate", "Selection"]
 
@@ -66,7 +67,6 @@ class Selection:
         self._check_range()
         has_levels = source.model.energy_latents is not None
         self._energy = EnergyCut(source, cuts) if cuts.cut_energy and has_levels else None
-        self._drawing = Drawing(source, cuts, target, self._energy)
         self.rejects = (
             cuts.cut_zenith or (cuts.cut_energy and not has_levels) or (target is not None and target.rejects)
         )
@@ -74,20 +74,24 @@ class Selection:
     @property
     def piece(self) -> int:
         """The muons of a task, in whole blocks."""
-        if self.on_device is not None:
-            return self.on_device.muons
         return self._attempts.muons if self.rejects else self._piece
 
     @cached_property
-    def on_device(self) -> DeviceBlocks | None:
-        """What makes these muons in a GPU's memory; None where they are cut or put on a target, or come from here."""
-        return None if self.cuts or self.target is not None else self.source.on_device
+    def on_device(self) -> DeviceMaker | None:
+        """What makes these muons in a GPU's memory; None where they come from here."""
+        device = self.source.on_device
+        if device is None or self.target is None or device.puts_on(self.target):
+            return device
+        return None
 
     def empty(self, n: int, *, has_time: bool = False) -> Muons:
         """Return n muons whose columns are yet to be filled."""
-        if self.on_device is not None and not has_time:
-            return self.on_device.empty_on_host(n)
-        return Muons.empty(n, has_place=self.target is not None, has_time=has_time)
+        has_place = self.target is not None
+        if self.on_device is None:
+            return Muons.empty(n, has_place=has_place, has_time=has_time)
+        from deepmuon_runtime.cuda.memory import empty_on_host
+
+        return empty_on_host(n, has_place=has_place, has_time=has_time)
 
     def fill(self, muons: Muons, seed: int, first: int, stopped: Callable[[], object] = _never) -> None:
         """Make the muons from number `first` on.
@@ -95,7 +99,7 @@ class Selection:
         Parameters
         ----------
         muons
-            What is to be filled, with places where there is a target.
+            What is to be filled, with places where there is a target; in a GPU's memory only if they are made there.
         seed
             0 to 2^64 - 1.
         first
@@ -108,21 +112,26 @@ class Selection:
         FailedError
             If the model gives an unphysical muon.
         """
-        if self.on_device is not None:
-            self.on_device.fill(muons, seed, first, stopped)
-            return
-        size = self._attempts.muons if self.rejects else self.source.block_muons
+        size = self._attempts.muons if self.rejects else self._maker.block_draws * self.source.model.muons_per_draw
         done = 0
         while done < len(muons):
             stopped()
             unit, skipped = divmod(first + done, size)
             part = muons[done : done + size - skipped]
-            if self.rejects:
-                self._attempts.fill(part, seed, unit, skipped, stopped)
+            make = partial(self._make, seed, unit, skipped, stopped)
+            if self.on_device is None:
+                make(part)
             else:
-                draws = range(unit * self.source.block_draws, (unit + 1) * self.source.block_draws)
-                self._drawing.first(part, seed, draws, skipped)
+                self.on_device.fill(part, make)
             done += len(part)
+
+    def _make(self, seed: int, unit: int, skipped: int, stopped: Callable[[], object], muons: Muons) -> None:
+        """Make muons of a unit, which is a block where none are rejected, in the memory where they are made."""
+        if self.rejects:
+            self._attempts.fill(muons, seed, unit, skipped, stopped)
+        else:
+            draws = self._maker.block_draws
+            self._drawing.first(muons, seed, range(unit * draws, (unit + 1) * draws), skipped)
 
     @cached_property
     def share(self) -> float:
@@ -174,8 +183,18 @@ class Selection:
 
     @property
     def _piece(self) -> int:
+        if self.on_device is not None:
+            return self.on_device.block_muons
         block = self.source.block_muons
         return -(-PIECE[self.source.device] // block) * block
+
+    @property
+    def _maker(self) -> Maker:
+        return self.source if self.on_device is None else self.on_device
+
+    @cached_property
+    def _drawing(self) -> Drawing:
+        return Drawing(self._maker, self.cuts, self.target, self._energy)
 
     @cached_property
     def _attempts(self) -> Attempts:

@@ -6,12 +6,14 @@ import threading
 import warnings
 from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import FailedError, RefusedError, first_line
+from deepmuon_runtime.latents.again import numbers_again
+from deepmuon_runtime.latents.philox import FOR_LATENTS, fill_latents
 from deepmuon_runtime.model.metadata import LATENTS_PER_MUON, Model
 from deepmuon_runtime.muons import MU_PLUS, Muons
 from deepmuon_runtime.physical import check_physical
@@ -19,10 +21,10 @@ from deepmuon_runtime.physical import check_physical
 if TYPE_CHECKING:
     import onnxruntime
 
-    from deepmuon_runtime.cuda.blocks import DeviceBlocks
+    from deepmuon_runtime.cuda.maker import DeviceMaker
     from deepmuon_runtime.model.bound_run import BoundRun
 
-__all__ = ["TRIED", "Source"]
+__all__ = ["TRIED", "Source", "block_draws"]
 
 # Muons of one run of the network, about: what it works on stays in a CPU's cache; a GPU wants much at once.
 BLOCK = {"cpu": 1 << 14, "cuda": 1 << 18}
@@ -33,7 +35,7 @@ Outputs = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int8]]  # e
 
 
 class Source:
-    """A model of one depth and surface on a device.
+    """A model of one depth and surface on a device, whose muons come into the computer's memory: a `Maker`.
 
     Parameters
     ----------
@@ -49,22 +51,22 @@ class Source:
     def __init__(self, session: onnxruntime.InferenceSession, model: Model, device: str) -> None:
         self.model = model
         self.device = device
-        self.block_draws = _block_draws(model, device)
+        self.block_draws = block_draws(model, device)
         self._session = session
         self._own = threading.local()  # each thread's memory for its runs
 
     @cached_property
-    def on_device(self) -> DeviceBlocks | None:
+    def on_device(self) -> DeviceMaker | None:
         """What makes this model's muons in a GPU's memory alone, where it runs on one and CuPy is installed."""
         if self.device != "cuda":
             return None
-        from deepmuon_runtime.cuda.blocks import INSTALL, DeviceBlocks
+        from deepmuon_runtime.cuda.maker import INSTALL, DeviceMaker
         from deepmuon_runtime.model.device import has_cupy
 
         if not has_cupy():
             warnings.warn(f"random numbers for the GPU come from the processor, which is slow: {INSTALL}", stacklevel=6)
             return None
-        return DeviceBlocks(self._session, self.model)
+        return DeviceMaker(self._session, self.model)
 
     @property
     def block_muons(self) -> int:
@@ -72,21 +74,38 @@ class Source:
         return self.block_draws * self.model.muons_per_draw
 
     @property
-    def block_latents(self) -> NDArray[np.float32]:
-        """The thread's own memory for the latents of a block, float32 [block_draws, latent_size]: to be filled."""
-        return self._thread_run().latent
+    def arrays(self) -> Any:
+        """Numpy."""
+        return np
 
-    def run_block(self, muons: Muons, skipped: int = 0) -> None:
-        """Make the muons of a block from `block_latents`, leave out the first, and keep as many as `muons` holds."""
-        self._run(self._thread_run(), skipped, muons)
+    def empty(self, n: int, *, has_place: bool) -> Muons:
+        """Return n muons whose columns are yet to be filled."""
+        return Muons.empty(n, has_place=has_place)
 
-    def run(self, latent: NDArray[np.float32], muons: Muons) -> None:
-        """Make all muons of some draws, at most those of a block, from latents [draws, latent_size]."""
+    def latents(self, draws: int) -> NDArray[np.float32]:
+        """Return memory for the latents of some draws: of a block the thread's own, else new."""
+        is_block = draws == self.block_draws
+        return self._thread_run().latent if is_block else np.empty((draws, self.model.latent_size), np.float32)
+
+    def fill_latents(self, latent: NDArray[np.float32], seed: int, first: int, purpose: int = FOR_LATENTS) -> None:
+        """Fill an array with the latents of consecutive draws."""
+        fill_latents(latent, seed, first, self.model.stream, purpose=purpose)
+
+    def numbers_again(
+        self, seed: int, attempts: NDArray[np.int64], draws: NDArray[np.int64], size: int
+    ) -> NDArray[np.float32]:
+        """Return the numbers of some draws at later attempts."""
+        return numbers_again(seed, self.model.stream, attempts, draws, size)
+
+    def run(self, latent: NDArray[np.float32], muons: Muons, skipped: int = 0) -> None:
+        """Make the muons of some draws, and keep as many as asked for; raise FailedError if the model fails."""
         if len(latent) == self.block_draws:
-            self.block_latents[:] = latent
-            self.run_block(muons)
+            run = self._thread_run()
+            if latent is not run.latent:
+                run.latent[:] = latent
+            self._run(run, skipped, muons)
         else:
-            self._run(lambda: self._outputs(latent), 0, muons)
+            self._run(lambda: self._outputs(latent), skipped, muons)
 
     def check(self, muons: Muons, first: int) -> None:
         """Raise FailedError if one of these muons, from number `first` on, can't be one."""
@@ -142,7 +161,7 @@ class Source:
         np.multiply(charge[kept], np.int8(MU_PLUS), out=muons.pdg_id)
 
 
-def _block_draws(model: Model, device: str) -> int:
+def block_draws(model: Model, device: str) -> int:
     """Return how many draws make a block: of large ones, which each thread has in memory, as few as one."""
     size = max(model.muons_per_draw, model.latent_size // LATENTS_PER_MUON)
     # Multiples of 8 draws where they fit: a block then begins with a whole step of the random number generator.

@@ -8,6 +8,7 @@ from abc import abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
+from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.targets.sphere import entry
 from deepmuon_runtime.targets.target import TOLERANCE, Array, Entries, Target, checked_sizes
 
@@ -17,6 +18,9 @@ POINTS = 4096
 """Of the disc by which a shadow is measured where nothing better is known."""
 
 AT_ONCE = 1 << 20  # of those points
+
+MOST_OUTSIDE = 1e-3
+"""Of the radius, by which a line may enter the body before the sphere: by rounding, where it only grazes both."""
 
 
 class ConvexBody(Target):
@@ -103,14 +107,26 @@ class ConvexBody(Target):
         return np.concatenate(areas)
 
     def enters(self, u: Array, v: Array, w: Array, numbers: Array) -> Entries:
-        """Throw muons at the disc of the sphere, and see which lines meet the body."""
+        """Throw muons at the disc of the sphere, and see which lines meet the body.
+
+        Raises
+        ------
+        RefusedError
+            If the radius is no finite number above 0, or a line enters the body before the sphere: it holds not all.
+        """
         checked_sizes(f"a {self.name}", radius=self.radius)
         u, v, w, numbers = (part.astype(np.float64) for part in (u, v, w, numbers))
         x, y, z = (self.radius * part for part in entry(u, v, w, numbers))
         with np.errstate(invalid="ignore", divide="ignore"):
-            path = np.asarray(self.path(x, y, z, u, v, w), np.float64)
+            path = np.asarray(self.path(x, y, z, u, v, w), np.float64, like=x)
         hits = np.isfinite(path)
         path = np.where(hits, path, 0.0)
+        # A GPU would be waited for; the integration of the rate, on the processor, looks in any case.
+        if isinstance(path, np.ndarray) and path.min(initial=0.0) < -MOST_OUTSIDE * self.radius:
+            raise RefusedError(
+                f"the {self.name} reaches {-path.min():.3g} m out of the sphere of {self.radius:g} m that should hold "
+                "all of it: give a larger radius"
+            )
         return Entries(hits, x + path * u, y + path * v, z + path * w)
 
     def touches(self, x: Array, y: Array, z: Array, u: Array, v: Array, w: Array) -> NDArray[np.bool_]:

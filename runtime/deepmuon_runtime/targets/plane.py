@@ -61,7 +61,7 @@ class Plane(Target):
         """Put all muons on it: the flux through a horizontal plane has the factor cos zenith already."""
         x = np.float32(self.x / 2) * numbers[:, 0]
         y = np.float32(self.y / 2) * numbers[:, 1]
-        return Entries(np.ones(len(w), bool), x, y, np.zeros_like(x))
+        return Entries(np.ones_like(w, bool), x, y, np.zeros_like(x))
 
     def touches(self, x: Array, y: Array, z: Array, u: Array, v: Array, w: Array) -> NDArray[np.bool_]:
         """Tell whether places are on the rectangle."""

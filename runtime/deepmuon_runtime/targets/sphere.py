@@ -60,7 +60,7 @@ class Sphere(Target):
         """Put all muons on it, uniform on the disc across their directions."""
         radius = np.float32(self.radius)
         x, y, z = (radius * part for part in entry(u, v, w, numbers))
-        return Entries(np.ones(len(w), bool), x, y, z)
+        return Entries(np.ones_like(w, bool), x, y, z)
 
     def touches(self, x: Array, y: Array, z: Array, u: Array, v: Array, w: Array) -> NDArray[np.bool_]:
         """Tell whether places are on the half that muons come in by."""

@@ -33,7 +33,8 @@ class Entries(NamedTuple):
 class Target(ABC):
     """A plane or a body, all of whose muons are wanted, and no others.
 
-    Directions (u, v, w) are those of motion, of length 1, z up, and w < 0: arrays [n] of any floating-point type.
+    Directions (u, v, w) are those of motion, of length 1, z up, and w < 0: arrays [n] of any floating-point type. Those
+    of `enters` may be CuPy's: numpy's functions on them call CuPy's, and it makes no arrays but by such functions.
 
     Attributes
     ----------

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import RefusedError
+from deepmuon_runtime.model.metadata import SPHERE
 from deepmuon_runtime.muon_file.reader import read_attributes, read_pieces
 from deepmuon_runtime.physical import HIGHEST_ENERGY, LOWEST_ENERGY
 
@@ -85,7 +86,8 @@ def count_spectra(path: str | Path, *, progress: Callable[[int], object] | None 
         medium=str(attributes["medium"]),
         flux=attributes.get("flux"),
         count=count,
-        rate=attributes.get("rate_hz_per_m2"),
+        # That of a sphere's muons is none of a horizontal plane's m2.
+        rate=None if attributes.get("surface") == SPHERE else attributes.get("rate_hz_per_m2"),
         by_energy=by_energy,
         by_cos_zenith=by_cos_zenith,
     )

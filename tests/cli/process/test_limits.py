@@ -19,6 +19,8 @@ from support.thorough import TIMES
 from deepmuon_runtime import Generator, check_file
 from deepmuon_runtime.files.partial import PARTIAL_SUFFIX
 
+pytestmark = pytest.mark.campaign
+
 MEGABYTE = 1 << 20
 
 

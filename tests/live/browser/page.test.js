@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
-import { isFamily } from "../../../docs/live/models.js";
+import { familyAt, isFamily } from "../../../docs/live/models.js";
 import { openBrowser, serveSite } from "./site.js";
 
 const PYTHON = process.env.PYTHON ?? "python";
@@ -66,25 +66,53 @@ async function open(page) {
 
 /**
  * @param {Page} page
- * @param {{depth?: number | string, metres?: number, architecture?: string, number?: string, seed?: string}} wanted
+ * @param {Choices & {number?: string, seed?: string}} wanted
  */
-async function generate(page, { depth, metres, architecture, number = "50000", seed = "" }) {
-    if (depth !== undefined) await page.getByLabel("Depth").selectOption(String(depth));
-    if (architecture !== undefined) await page.getByLabel("Architecture").selectOption(architecture);
-    if (metres !== undefined) await page.getByLabel("Metres of water").fill(String(metres));
+async function generate(page, { number = "50000", seed = "", ...choices }) {
+    await pick(page, choices);
     await page.getByLabel("Muons", { exact: true }).fill(number);
     await page.getByLabel("Seed").fill(seed);
     await page.getByRole("button", { name: "Generate" }).click();
+}
+
+/** @typedef {{flux?: string, medium?: string, architecture?: string, depth?: number | string, metres?: number}} Choices */
+
+/**
+ * Pick a model.
+ *
+ * @param {Page} page
+ * @param {Choices} choices
+ */
+async function pick(page, { metres, ...choices }) {
+    for (const [name, value] of Object.entries(choices)) {
+        const select = page.locator(`#${name}`);
+        if (value !== "any" || (await select.isVisible())) await select.selectOption(String(value));
+    }
+    if (metres !== undefined) await page.locator("#metres").fill(String(metres));
 }
 
 /**
  * What has to be chosen for a model, of a family at the depth that it says.
  *
  * @param {import("../../../docs/live/models.js").Model} model
+ * @returns {Choices}
  */
 function choicesOf(model) {
-    const { depth_m, architecture } = model;
-    return isFamily(model) ? { depth: "any", metres: depth_m, architecture } : { depth: depth_m, architecture };
+    const { flux, medium, architecture, depth_m } = model;
+    const depth = isFamily(model) ? { depth: "any", metres: depth_m } : { depth: depth_m };
+    return { flux, medium, architecture, ...depth };
+}
+
+/**
+ * A model that was judged by muons, of a family at a depth where it was.
+ *
+ * @returns {import("../../../docs/live/models.js").Model & {held_out: import("../../../docs/live/models.js").Counts}}
+ */
+function judged() {
+    const judged = released.models.flatMap((model) =>
+        isFamily(model) ? model.held_out_at.slice(0, 1).map(([depth]) => familyAt(model, depth)) : [model],
+    );
+    return /** @type {any} */ (judged.find(({ held_out }) => held_out));
 }
 
 /** @param {Page} page */
@@ -115,16 +143,26 @@ async function saveCsv(page) {
  * @param {number} seed
  * @returns {number[][]}
  */
-function muonsOfPackage({ depth_m, architecture }, number, seed) {
+function muonsOfPackage(model, number, seed) {
     const program = `
 import json
 from deepmuon_runtime import Generator
-muons = Generator.open(${depth_m}, architecture="${architecture}").sample(${number}, seed=${seed})
+muons = ${opening(model)}.sample(${number}, seed=${seed})
 columns = (muons.kinetic_energy, muons.u, muons.v, muons.w, muons.pdg_id)
 print(json.dumps([column.tolist() for column in columns]))`;
     /** @type {number[][]} */
     const columns = JSON.parse(execFileSync(PYTHON, ["-c", program], { encoding: "utf-8", maxBuffer: 1e9 }));
     return columns[0].map((_, i) => columns.map((column) => column[i]));
+}
+
+/**
+ * A Python expression for the generator of a released model.
+ *
+ * @param {import("../../../docs/live/models.js").Model} model
+ */
+function opening(model) {
+    const file = `__import__("importlib.resources").resources.files("deepmuon_models") / "${model.name}"`;
+    return `Generator.open(${isFamily(model) ? model.depth_m : "None"}, file=${file})`;
 }
 
 testPage("every released model gives the muons that the package makes of the same seed", async (page) => {
@@ -133,7 +171,7 @@ testPage("every released model gives the muons that the package makes of the sam
         await generate(page, { ...choicesOf(model), number: "2e4", seed: "1" });
         await finished(page);
         const { name, header, muons } = await saveCsv(page);
-        assert.equal(name, `muons-${model.architecture}-${model.depth_m}m-seed-1.csv`);
+        assert.equal(name, `muons-${model.flux}-${model.medium}-${model.architecture}-${model.depth_m}m-seed-1.csv`);
         assert.equal(header, "kinetic_energy_GeV,u,v,w,pdg_id");
         assert.equal(muons.length, number);
         let otherCharges = 0;
@@ -154,10 +192,8 @@ testPage("every released model gives the muons that the package makes of the sam
 });
 
 testPage("the energies fill the spectrum of muons kept out of the training", async (page) => {
-    const model = /** @type {import("../../../docs/live/models.js").Model} */ (
-        released.models.find(({ held_out }) => held_out)
-    );
-    const held = /** @type {import("../../../docs/live/models.js").Counts} */ (model.held_out).by_energy;
+    const model = judged();
+    const held = model.held_out.by_energy;
     await generate(page, { ...choicesOf(model), number: "2e5", seed: "3" });
     await finished(page);
     const { muons } = await saveCsv(page);
@@ -206,9 +242,12 @@ testPage("the keyboard is enough, and shows where it is", async (page) => {
         );
         assert.equal(outline, "3px");
     };
+    await tabTo("flux");
+    await tabTo("medium");
+    await tabTo("architecture");
+    await page.keyboard.press("End");
     await tabTo("depth");
     await page.keyboard.press("End");
-    await tabTo("architecture");
     await tabTo("number");
     await page.keyboard.press("Control+A");
     await page.keyboard.type("20000");
@@ -217,7 +256,8 @@ testPage("the keyboard is enough, and shows where it is", async (page) => {
     await page.keyboard.press("Enter");
     await finished(page);
     assert.equal(await focused(), "generate");
-    const deepest = Math.max(...released.models.map(({ depth_m }) => depth_m));
+    const fixed = released.models.filter((model) => !isFamily(model));
+    const deepest = Math.max(...fixed.map(({ depth_m }) => depth_m));
     assert.match(await page.locator("#command").innerText(), new RegExp(`--depth ${deepest} .* -n 20000 --seed 5 `));
     await tabTo("save");
     const [file] = await Promise.all([page.waitForEvent("download"), page.keyboard.press("Enter")]);
@@ -262,7 +302,7 @@ for (const colorScheme of /** @type {const} */ (["light", "dark"])) {
     testPage(
         `everything can be read in the ${colorScheme} theme`,
         async (page) => {
-            await generate(page, { depth: 0 });
+            await generate(page, choicesOf(judged()));
             await finished(page);
             await page.getByLabel("Seed").fill("-1");
             const background = luminance(await style(page, "body", "background-color"));
@@ -419,28 +459,75 @@ testPage(
     { serviceWorkers: "block", complaints: /blocked by Playwright/ },
 );
 
-/** A small family in place of the released models: any depth from 0 to 100 m, and what the page knows of it. */
-const FAMILY = JSON.parse(
-    execFileSync(
-        PYTHON,
-        [
-            "-c",
-            `
+/**
+ * A small family and what the page knows of it.
+ *
+ * @param {string} options of the package's tiny family
+ * @param {(depth: number) => number} rateAt
+ * @returns {{content: Buffer, model: import("../../../docs/live/models.js").Family}}
+ */
+function familyOf(options, rateAt) {
+    const program = `
 import base64, json, sys
 sys.path.insert(0, "tests")
-from support.tiny_families import tiny_family, tiny_rate
-from deepmuon_runtime.latents.philox import latents
+import numpy as np
+from support.tiny_families import tiny_family
 from deepmuon_runtime.model.opening import checked_model, load_model
-content = tiny_family()
+content = tiny_family(${options})
 _, model, _ = load_model(*checked_model(content, "family.onnx"), "cpu")
-fields = "name sha256 architecture flux medium surface depth_m depth_min_m depth_max_m muons_per_draw latent_size"
+fields = "sha256 architecture flux medium surface depth_m depth_min_m depth_max_m muons_per_draw latent_size"
 known = {field: getattr(model, field) for field in f"{fields} energy_min_gev energy_max_gev rate_hz_per_m2".split()}
-known |= {"has_sphere": True, "held_out": None, "rates": [[depth, tiny_rate(depth)] for depth in range(0, 101)]}
-print(json.dumps({"content": base64.b64encode(content).decode(), "model": known}))`,
-        ],
-        { encoding: "utf-8", cwd: new URL("../../..", import.meta.url) },
-    ),
+known |= {"has_sphere": True, "held_out": None, "held_out_at": [], "options": ""}
+print(json.dumps({"content": base64.b64encode(content).decode(), "model": known}))`;
+    const cwd = new URL("../../..", import.meta.url);
+    const { content, model } = JSON.parse(execFileSync(PYTHON, ["-c", program], { encoding: "utf-8", cwd }));
+    const depths = Array.from({ length: 101 }, (_, i) => (i / 100) * model.depth_max_m);
+    return {
+        content: Buffer.from(content, "base64"),
+        model: {
+            ...model,
+            name: `tiny-${model.flux}-${model.medium}.onnx`,
+            rates: depths.map((depth) => [depth, rateAt(depth)]),
+        },
+    };
+}
+
+/**
+ * @param {number} depth
+ * @param {[number, number][]} known the least depth first
+ */
+function linearly(depth, known) {
+    const above = Math.max(
+        1,
+        known.findIndex(([other]) => other >= depth),
+    );
+    const [[upper, first], [lower, second]] = known.slice(above - 1, above + 1);
+    return first + ((second - first) * (depth - upper)) / (lower - upper);
+}
+
+/** A family in place of the released ones: any depth from 0 to 100 m of water. */
+const FAMILY = familyOf('{"flux": "cry"}', (depth) =>
+    linearly(depth, [
+        [0, 110],
+        [50, 10],
+        [100, 2],
+    ]),
 );
+
+/** Another one: of another flux, through as much rock that a muon comes in weeks. */
+const DEEP = familyOf(
+    `{"flux": "measured", "medium": "rock", "depth_max_m": "5000"}, changes={
+        "spacing": np.float32(2500),
+        "maps/rate": np.float32([[[110], [1e-3], [1e-6]], [[150], [1e-3], [1e-6]]]),
+    }`,
+    (depth) =>
+        linearly(depth, [
+            [0, 110],
+            [2500, 1e-3],
+            [5000, 1e-6],
+        ]),
+);
+DEEP.model.options = "--flux measured --medium rock ";
 
 /**
  * The muons of the family at a depth by the package.
@@ -458,29 +545,31 @@ from support.tiny_families import tiny_family
 from deepmuon_runtime import Generator
 with tempfile.TemporaryDirectory() as folder:
     path = pathlib.Path(folder, "family.onnx")
-    path.write_bytes(tiny_family())
+    path.write_bytes(tiny_family({"flux": "cry"}))
     print(json.dumps(Generator.open(${depth}, file=path).sample(${number}, seed=${seed}).kinetic_energy.tolist()))`;
     const cwd = new URL("../../..", import.meta.url);
     return JSON.parse(execFileSync(PYTHON, ["-c", program], { encoding: "utf-8", cwd }));
 }
 
 /**
- * The page with the family among its models, and no other.
+ * The page with the families among its models, and no others.
  *
  * @param {Page} page
  */
 async function openWithFamily(page) {
-    const fixed = released.models.filter((model) => !isFamily(model));
+    const fixed = released.models.filter(({ architecture }) => architecture === TRANSFORMER.architecture);
+    const families = [FAMILY, DEEP];
+    const models = [...families.map(({ model }) => model), ...fixed];
     await page
         .context()
-        .route("**/live/models.json", (route) =>
-            route.fulfill({ json: { ...released, models: [...fixed, FAMILY.model] } }),
-        );
-    await page
-        .context()
-        .route("**/live/models/family.onnx", (route) => route.fulfill({ body: Buffer.from(FAMILY.content, "base64") }));
+        .route("**/live/models.json", (route) => route.fulfill({ json: { default: FAMILY.model.name, models } }));
+    for (const { model, content } of families) {
+        await page.context().route(`**/live/models/${model.name}`, (route) => route.fulfill({ body: content }));
+    }
     await open(page);
 }
+
+const TRANSFORMER = { flux: "cry", medium: "water", architecture: "transformer" };
 
 const withoutWorkers = { serviceWorkers: /** @type {const} */ ("block"), complaints: /blocked by Playwright/ };
 
@@ -488,7 +577,7 @@ testPage(
     "a family offers any depth, and gives the muons that the package makes of it there",
     async (page) => {
         const fields = [page.locator("#slider"), page.getByLabel("Metres of water")];
-        await page.getByLabel("Depth").selectOption("0");
+        await pick(page, { ...TRANSFORMER, depth: 0 });
         for (const field of fields) assert.ok(await field.isHidden());
         await openWithFamily(page);
         for (const field of fields) assert.ok(await field.isVisible());
@@ -499,7 +588,7 @@ testPage(
             await finished(page);
             assert.match(await page.locator("#command").innerText(), new RegExp(`--depth ${depth} `));
             const { name, muons } = await saveCsv(page);
-            assert.equal(name, `muons-quantile-${depth}m-seed-5.csv`);
+            assert.equal(name, `muons-cry-water-quantile-${depth}m-seed-5.csv`);
             for (const [i, energy] of familysEnergies(depth, 1000, 5).entries()) {
                 assert.ok(Math.abs(muons[i][0] / energy - 1) < 1e-5, `energy ${i} at ${depth} m`);
             }
@@ -524,11 +613,75 @@ testPage(
         }
         assert.equal(seen.size, 4);
         await slider.focus();
-        await page.keyboard.press("ArrowLeft");
-        await page
-            .getByRole("status")
-            .getByText(/The spectrum under 9\d/)
-            .waitFor();
+        for (const [key, depth] of [
+            ["ArrowLeft", 80],
+            ["PageDown", 10],
+            ["ArrowUp", 12],
+            ["End", 100],
+        ]) {
+            await page.keyboard.press(/** @type {string} */ (key));
+            assert.equal(await page.getByLabel("Metres of water").inputValue(), String(depth));
+            await page.getByRole("status").getByText(`The spectrum under ${depth} m of water`).waitFor();
+        }
+        assert.equal(await slider.getAttribute("aria-valuetext"), "100 m of water, 2 muons a second and square metre");
+    },
+    withoutWorkers,
+);
+
+testPage(
+    "flux, medium, architecture and depth are chosen among what there is",
+    async (page) => {
+        await openWithFamily(page);
+        /** @param {string} id */
+        const offered = (id) => page.locator(`#${id} option`).allInnerTexts();
+        assert.deepEqual(await offered("flux"), ["CRY’s", "measured"]);
+        assert.deepEqual(await offered("architecture"), ["quantile", "transformer"]);
+        assert.ok(await page.locator("#depth").isHidden());
+        await page.locator("#metres").fill("28");
+        await pick(page, { architecture: "transformer" });
+        assert.ok(await page.locator("#slider").isHidden());
+        assert.equal(await page.locator("#depth").inputValue(), "30");
+        await pick(page, { flux: "measured" });
+        assert.deepEqual(await offered("medium"), ["rock"]);
+        assert.deepEqual(await offered("architecture"), ["quantile"]);
+        assert.equal(await page.getByLabel("Metres of rock").inputValue(), "30");
+        await generate(page, { metres: 4000, number: "1000", seed: "5" });
+        await finished(page);
+        assert.equal(
+            await page.locator("#command").innerText(),
+            "deepmuon-gen --flux measured --medium rock --depth 4000 --architecture quantile -n 1000 --seed 5 -o muons.h5",
+        );
+        await pick(page, { flux: "cry" });
+        assert.equal(await page.getByLabel("Metres of water").inputValue(), "100");
+    },
+    withoutWorkers,
+);
+
+testPage(
+    "where a muon comes in weeks, axes and words follow, and time can go faster",
+    async (page) => {
+        await openWithFamily(page);
+        for (const pace of ["#pace", "#target-pace"]) assert.ok(await page.locator(pace).isHidden());
+        await pick(page, { flux: "measured", metres: 5000 });
+        await page.getByRole("status").getByText("The spectrum under 5000 m of rock").waitFor();
+        await page.getByText("31.6 muons a year under 5000 m of rock, one in 2 weeks").waitFor();
+        const chart = await page.locator("#energy").innerText();
+        assert.ok(chart.includes("m⁻² year⁻¹") && chart.includes("10⁵"), chart);
+        await choose(page, "sphere", [0.5]);
+        await page.getByText("24.8 muons a year enter it under 5000 m of rock, one in 2 weeks.").waitFor();
+        await page.getByText("--sphere 0.5 --live-time 31557600").waitFor();
+        const [first, second] = await twoPictures(page, "#sky");
+        assert.equal(first, second);
+        for (const pace of ["#pace", "#target-pace"]) await page.locator(pace).selectOption("a year a second");
+        for (const picture of ["#sky", "#target-drawing"]) {
+            await page.waitForTimeout(500);
+            const [before, after] = await twoPictures(page, picture);
+            assert.notEqual(before, after);
+        }
+        await page.locator("#metres").fill("2500");
+        await page.getByText("3.6 muons an hour under 2500 m of rock").waitFor();
+        assert.ok(!(await page.locator("#pace option").allInnerTexts()).includes("a year a second"));
+        assert.ok((await page.locator("#pace").inputValue()) !== "1");
     },
     withoutWorkers,
 );
@@ -543,8 +696,8 @@ testPage(
         await page.getByRole("button", { name: "Generate" }).click();
         const input = page.getByLabel("Metres of water");
         assert.ok(await input.evaluate((element) => element === document.activeElement));
-        assert.equal(await page.locator("#metres-note").innerText(), "How deep? From 0 to 100 m, such as 13.7.");
-        await page.getByLabel("Depth").selectOption("10");
+        assert.equal(await page.locator("#metres-note").innerText(), "How deep? From 0 to 100 m.");
+        await pick(page, { architecture: "transformer" });
         assert.ok(await input.isHidden());
         await generate(page, {});
         await finished(page);
@@ -569,79 +722,88 @@ function rateOfTarget(page) {
     return page.locator("#target-note").getByText("muons a second enter it");
 }
 
-/**
- * What the worker says of a target.
- *
- * @param {Page} page
- * @param {import("../../../docs/live/models.js").Model} model
- * @param {string} kind
- * @param {number[]} sizes
- * @returns {Promise<{hz: number, hits: number[]}>}
- */
-function aimOfPage(page, model, kind, sizes) {
-    return page.evaluate(async ([address, model, kind, sizes]) => {
-        const { Engine } = await import(`${address}live/engine.js`);
-        const engine = new Engine();
-        const { hz, hits } = await engine.ask("aim", model, kind, sizes, 7n);
-        engine.close();
-        return { hz, hits: [...hits] };
-    }, /** @type {const} */ ([site.address, model, kind, sizes]));
-}
-
-/**
- * The same by the package: the rate, and of a sphere, which rejects nothing, the first muons.
- *
- * @param {string} open a Python expression for the generator
- * @param {string} kind
- * @param {number[]} sizes
- * @returns {{hz: number, muons: number[][]}}
- */
-function aimOfPackage(open, kind, sizes) {
-    const program = `
-import json, sys, tempfile, pathlib
-sys.path.insert(0, "tests")
-from support.tiny_families import tiny_family
-from deepmuon_runtime import Generator
-from deepmuon_runtime.targets.by_name import target_of
-with tempfile.TemporaryDirectory() as folder:
-    path = pathlib.Path(folder, "family.onnx")
-    path.write_bytes(tiny_family())
-    generator = ${open}
-    target = target_of("${kind}", ${JSON.stringify(sizes)})
-    muons = generator.sample(1000, seed=7, target=target)
-    columns = (muons.kinetic_energy, muons.u, muons.v, muons.w, muons.x, muons.y, muons.z)
-    rows = list(zip(*(column.tolist() for column in columns)))
-    print(json.dumps({"hz": generator.rate(target=target).hz, "muons": rows}))`;
-    const cwd = new URL("../../..", import.meta.url);
-    return JSON.parse(
-        execFileSync(PYTHON, ["-W", "ignore", "-c", program], { encoding: "utf-8", cwd, maxBuffer: 1e9 }),
-    );
-}
-
 const TARGETS = /** @type {[string, number[]][]} */ ([
     ["box", [4, 4, 3]],
     ["cylinder", [0.5, 8]],
     ["sphere", [2]],
 ]);
 
+/**
+ * What the worker says of each target.
+ *
+ * @param {Page} page
+ * @param {import("../../../docs/live/models.js").Model} model
+ * @returns {Promise<{hz: number, hits: number[], ends: {depth_m: number, flux: number}[] | undefined}[]>}
+ */
+function aimsOfPage(page, model) {
+    return page.evaluate(async ([address, model, targets]) => {
+        const { Engine } = await import(`${address}live/engine.js`);
+        const engine = new Engine();
+        const found = [];
+        for (const [kind, sizes] of targets) {
+            const { hz, hits, ends } = await engine.ask("aim", model, kind, sizes, 7n);
+            found.push({ hz, hits: [...hits], ends });
+        }
+        engine.close();
+        return found;
+    }, /** @type {const} */ ([site.address, model, TARGETS]));
+}
+
+/**
+ * The same by the package: rates, of a sphere, which rejects nothing, the first muons, and what is warned of.
+ *
+ * @param {string} open a Python expression for the generator
+ * @returns {{hz: number, muons: number[][], warned: string[]}[]}
+ */
+function aimsOfPackage(open) {
+    const program = `
+import json, sys, tempfile, pathlib, warnings
+sys.path.insert(0, "tests")
+from support.tiny_families import tiny_family
+from deepmuon_runtime import Generator
+from deepmuon_runtime.targets.by_name import target_of
+found = []
+with tempfile.TemporaryDirectory() as folder:
+    path = pathlib.Path(folder, "family.onnx")
+    path.write_bytes(tiny_family({"flux": "cry"}))
+    generator = ${open}
+    for kind, sizes in ${JSON.stringify(TARGETS)}:
+        target = target_of(kind, sizes)
+        with warnings.catch_warnings(record=True) as warned:
+            warnings.simplefilter("always")
+            muons = generator.sample(1000, seed=7, target=target)
+        columns = (muons.kinetic_energy, muons.u, muons.v, muons.w, muons.x, muons.y, muons.z)
+        rows = list(zip(*(column.tolist() for column in columns)))
+        texts = [str(one.message) for one in warned]
+        found.append({"hz": generator.rate(target=target).hz, "muons": rows, "warned": texts})
+print(json.dumps(found))`;
+    const cwd = new URL("../../..", import.meta.url);
+    return JSON.parse(execFileSync(PYTHON, ["-c", program], { encoding: "utf-8", cwd, maxBuffer: 1e9 }));
+}
+
 testPage(
-    "a target has the rate that the package says, and a sphere its muons and where they enter",
+    "a target has the rates that the package says, at its ends too, and a sphere its muons and where they enter",
     async (page) => {
         await openWithFamily(page);
         const depth = 10;
         /** @type {[import("../../../docs/live/models.js").Model, string][]} */
         const families = [[{ ...FAMILY.model, depth_m: depth }, `Generator.open(${depth}, file=path)`]];
         for (const model of released.models.filter(({ has_sphere }) => has_sphere)) {
-            families.push([
-                { ...model, depth_m: depth },
-                `Generator.open(${depth}, architecture="${model.architecture}")`,
-            ]);
+            families.push([{ ...model, depth_m: depth }, opening({ ...model, depth_m: depth })]);
         }
         for (const [model, open] of families) {
-            for (const [kind, sizes] of TARGETS) {
-                const { hz, hits } = await aimOfPage(page, model, kind, sizes);
-                const expected = aimOfPackage(open, kind, sizes);
+            const [ofPage, ofPackage] = [await aimsOfPage(page, model), aimsOfPackage(open)];
+            for (const [target, [kind]] of TARGETS.entries()) {
+                const { hz, hits, ends } = ofPage[target];
+                const expected = ofPackage[target];
                 assert.ok(Math.abs(hz / expected.hz - 1) < 1e-3, `${model.name}, ${kind}: ${hz}, not ${expected.hz}`);
+                const said = ends?.map(({ depth_m, flux }) => [flux, depth_m]).flat() ?? [];
+                const warned = expected.warned.join().match(/: (\S+) a .* at (\S+) m, and (\S+) .* at (\S+) m$/) ?? [];
+                assert.equal(said.length, expected.warned.length * 4, `${model.name}, ${kind}: ${expected.warned}`);
+                for (const [i, number] of warned.slice(1).entries()) {
+                    // The package knows a rate to five digits.
+                    assert.ok(Math.abs(said[i] / Number(number) - 1) < 1e-4, `${said}, not ${expected.warned}`);
+                }
                 if (kind !== "sphere") continue;
                 for (const [i, [energy, ...rest]] of expected.muons.entries()) {
                     const [found, ...others] = hits.slice(7 * i, 7 * i + 7);
@@ -659,7 +821,7 @@ testPage(
 testPage(
     "a target is offered where a family is picked, and its rate follows its sizes and the depth",
     async (page) => {
-        await page.getByLabel("Depth").selectOption("0");
+        await pick(page, { ...TRANSFORMER, depth: 0 });
         assert.ok(await page.getByLabel("Target", { exact: true }).isHidden());
         await openWithFamily(page);
         assert.ok(await page.locator("#target-drawing").isHidden());
@@ -676,10 +838,18 @@ testPage(
         await rateOfTarget(page).getByText("under 80 m of water").waitFor();
         seen.add(await rateOfTarget(page).innerText());
         assert.equal(seen.size, TARGETS.length + 1);
+        const text = await page.locator("#target-ends").innerText();
+        assert.match(
+            text,
+            /^The sphere gets .* at 80 m, all over: .* a second .* top, at 78 m, and .* foot, at 82 m.$/,
+        );
+        await page.getByLabel("Metres of water").fill("0");
+        await rateOfTarget(page).getByText("at sea level").waitFor();
+        assert.equal(await page.locator("#target-ends").innerText(), "");
         await generate(page, {});
         await finished(page);
         assert.ok(await rateOfTarget(page).isVisible());
-        await page.getByLabel("Depth").selectOption("10");
+        await pick(page, { architecture: "transformer" });
         assert.ok(await page.locator("#target-drawing").isHidden());
     },
     withoutWorkers,
@@ -754,7 +924,7 @@ testPage(
     "a family that can't be had is told beside the target, which is there as soon as it can",
     async (page) => {
         await openWithFamily(page);
-        const missing = "**/live/models/family.onnx";
+        const missing = `**/live/models/${FAMILY.model.name}`;
         /** @param {import("playwright-core").Route} route */
         const refuse = (route) => route.fulfill({ status: 404 });
         await page.context().route(missing, refuse);

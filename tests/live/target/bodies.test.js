@@ -7,7 +7,7 @@ import { evenPoints } from "../../../docs/live/target/points.js";
 const PYTHON = process.env.PYTHON ?? "python";
 
 /** @typedef {import("../../../docs/live/target/bodies.js").Kind} Kind */
-/** @typedef {{hits: boolean[], places: number[][], areas: number[], rows: number[][], largest_area: number}} Answers */
+/** @typedef {{hits: boolean[], places: number[][], areas: number[], rows: number[][], largest_area: number, height: number}} Answers */
 
 /**
  * Directions and numbers, and what the package makes of them.
@@ -34,6 +34,7 @@ print(json.dumps({
     "rows": rows.tolist(),
     "areas": target.projected_area(u, v, w).tolist(),
     "largest_area": target.largest_area,
+    "height": target.vertical_size,
     "hits": entries.hits.tolist(),
     "places": np.stack([entries.x, entries.y, entries.z], axis=1).tolist(),
 }))`;
@@ -49,8 +50,9 @@ for (const [kind, ...sizes] of /** @type {[Kind, ...number[]][]} */ ([
 ])) {
     test(`a ${kind} of ${sizes.join(" x ")} m has the shadows and the entries of the package`, () => {
         const body = bodyOf(kind, sizes);
-        const { rows, areas, largest_area, hits, places } = answersOfPackage(kind, sizes);
+        const { rows, areas, largest_area, height, hits, places } = answersOfPackage(kind, sizes);
         assert.ok(Math.abs(body.largestArea / largest_area - 1) < 1e-12);
+        assert.equal(body.height, height);
         let otherwise = 0;
         for (const [i, [u, v, w, a, b, c]] of rows.entries()) {
             assert.ok(Math.abs(body.projectedArea(u, v, w) / areas[i] - 1) < 1e-5, `area ${i}`);

@@ -1,68 +1,87 @@
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support import cuda_emulation
 
-from deepmuon_runtime.cuda.kernels import FILL_LATENTS, KERNELS, TAKE_MUONS, THREADS, blocks
-from deepmuon_runtime.latents.philox import LARGEST_SEED, latents
+from deepmuon_runtime.cuda.kernels import Kernels
+from deepmuon_runtime.latents.again import numbers_again
+from deepmuon_runtime.latents.philox import LARGEST_SEED, fill_latents
 from deepmuon_runtime.muons import Muons
 from deepmuon_runtime.physical import first_unphysical, squared_length_tolerance
-
-NONE_IS_BAD = 2**64 - 1
 
 keys = st.integers(0, LARGEST_SEED)
 
 
 @pytest.fixture(scope="module")
-def kernels() -> cuda_emulation.RawModule:
-    return cuda_emulation.RawModule(KERNELS)
+def kernels() -> Iterator[Kernels]:
+    with pytest.MonkeyPatch.context() as patch:
+        for name, module in cuda_emulation.modules().items():
+            patch.setitem(sys.modules, name, module)
+        yield Kernels()
 
 
-def launch(kernels: cuda_emulation.RawModule, name: str, threads: int, *arguments: object) -> None:
-    kernels.get_function(name)((blocks(threads),), (THREADS,), arguments)
-
-
-@given(seed=keys, stream=keys, first=st.integers(0, 2**53), draws=st.integers(1, 60), latent_size=st.integers(1, 9))
-def test_the_latents_of_a_gpu_are_those_of_the_processor_to_the_bit(kernels, seed, stream, first, draws, latent_size):
+@given(
+    seed=keys,
+    stream=keys,
+    purpose=st.integers(0, 4),
+    first=st.integers(0, 2**53),
+    draws=st.integers(1, 60),
+    latent_size=st.integers(1, 9),
+)
+def test_the_latents_of_a_gpu_are_those_of_the_processor_to_the_bit(
+    kernels, seed, stream, purpose, first, draws, latent_size
+):
+    expected = np.empty((draws, latent_size), np.float32)
+    fill_latents(expected, seed, first, stream, purpose=purpose)
     found = cuda_emulation.array((draws, latent_size), np.float32)
-    begin, size = first * latent_size, found.size
-    threads = -(-size // 8) + 1
-    launch(kernels, FILL_LATENTS, threads, *map(np.uint64, (seed, stream, begin, size)), found)
-    assert np.array_equal(found, latents(seed, first, draws, latent_size, stream))
+    kernels.fill_latents(found, seed, stream, purpose, first * latent_size)
+    assert np.array_equal(found.get(), expected)
 
 
-def outputs(n: int) -> tuple[cuda_emulation.Array, ...]:
+@given(
+    seed=keys,
+    stream=keys,
+    draws=st.lists(st.integers(0, 2**53), min_size=1, max_size=30),
+    attempts=st.lists(st.integers(1, 2**40), min_size=1, max_size=3),
+    size=st.integers(1, 40),
+)
+def test_the_numbers_of_draws_made_again_are_those_of_the_processor_to_the_bit(
+    kernels, seed, stream, draws, attempts, size
+):
+    draw, attempt = np.array([(draw, attempt) for draw in sorted(draws) for attempt in attempts]).T.copy()
+    found = cuda_emulation.array((len(draw), size), np.float32)
+    kernels.fill_again(found, seed, stream, cuda_emulation.Array(attempt), cuda_emulation.Array(draw))
+    assert np.array_equal(found.get(), numbers_again(seed, stream, attempt, draw, size))
+
+
+def outputs(n: int) -> tuple[np.ndarray, ...]:
     """Energies, directions and charges of good muons, as a network gives them."""
     random = np.random.default_rng(5)
-    energy, direction, charge = (
-        cuda_emulation.array(shape, kind) for shape, kind in ((n, "f4"), ((n, 3), "f4"), (n, "i1"))
-    )
-    energy[:] = random.uniform(1, 10, n)
     drawn = random.normal(size=(n, 3))
     drawn[:, 2] = -np.abs(drawn[:, 2])
-    direction[:] = drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
-    charge[:] = random.choice([-1, 1], n)
-    return energy, direction, charge
+    direction = drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
+    return np.float32(random.uniform(1, 10, n)), np.float32(direction), np.int8(random.choice([-1, 1], n))
 
 
-def taken(kernels: cuda_emulation.RawModule, given: tuple, skipped: int, count: int) -> tuple[Muons, int]:
-    columns = [cuda_emulation.array(count, kind) for kind in ("f4", "f4", "f4", "f4", "i1")]
-    first_bad = cuda_emulation.array(1, np.uint64)
-    first_bad.fill(NONE_IS_BAD)
-    limits = np.float32(1), np.float32(10), squared_length_tolerance()
-    sizes = np.uint64(skipped), np.uint64(count)
-    launch(kernels, TAKE_MUONS, count, *sizes, *given, *limits, *columns, first_bad)
-    return Muons(*columns), int(first_bad[0])
+def taken(kernels: Kernels, given: tuple[np.ndarray, ...], skipped: int, count: int) -> tuple[Muons, int | None]:
+    """Muons as columns, and the position of the first bad one."""
+    muons = Muons.empty(count, column=cuda_emulation.array)
+    kernels.take_muons(tuple(map(cuda_emulation.Array, given)), skipped, muons)
+    first_bad = kernels.first_bad(muons, 1, 10)
+    return Muons(**{name: column.get() for name, column in muons.columns.items()}), first_bad
 
 
 def test_muons_are_cut_out_of_a_block_as_columns(kernels):
     energy, direction, charge = outputs(1000)
     muons, first_bad = taken(kernels, (energy, direction, charge), 300, 500)
     kept = slice(300, 800)
-    assert first_bad == NONE_IS_BAD
+    assert first_bad is None
     assert np.array_equal(muons.kinetic_energy, energy[kept])
     assert np.array_equal(np.stack([muons.u, muons.v, muons.w], axis=1), direction[kept])
     assert np.array_equal(muons.charge, charge[kept])

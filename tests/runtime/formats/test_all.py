@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from deepmuon_cli.options.formats import FORMATS as NAMES
-from deepmuon_runtime import Generator, RefusedError, check_file, convert_file
+from deepmuon_runtime import Generator, Muons, RefusedError, check_file, convert_file, write_muons
 from deepmuon_runtime.files.partial import PARTIAL_SUFFIX
 from deepmuon_runtime.formats.registry import FORMATS, format_of, opened_muons, output_format
 from deepmuon_runtime.muon_file.format import COLUMNS, OPTIONAL_COLUMNS
@@ -126,6 +126,48 @@ def test_what_a_generator_writes_is_good_in_every_format(tmp_path, model_file, n
     assert (report.examined, report.mu_plus) == (expected.examined, expected.mu_plus)
     assert report.mean_energy == pytest.approx(expected.mean_energy, rel=1e-6)
     assert report.attributes == {**expected.attributes, "created": report.attributes["created"]}
+
+
+@FORMS
+@pytest.mark.parametrize("optional", [["x"], ["x", "y"], ["weight"], ["time", "z"]])
+def test_columns_that_no_reader_would_take_are_refused_before_anything_is_written(tmp_path, name, optional):
+    path = tmp_path / f"muons.{name}"
+    with pytest.raises(RefusedError, match=rf"{optional[-1]}, which are none of a muon file"):
+        output_format(path).writer(path, ABOUT, optional=optional)
+
+
+@FORMS
+def test_memory_whose_muons_were_written_may_be_filled_again(tmp_path, name):
+    columns = some_columns(3000, ("x", "y", "z", "time"))
+    path, memory = tmp_path / f"muons.{name}", {key: np.empty(1000, values.dtype) for key, values in columns.items()}
+    with output_format(path).writer(path, ABOUT, optional=("x", "y", "z", "time")) as writer:
+        for first in range(0, 3000, 1000):
+            for key, values in columns.items():
+                memory[key][:] = values[first : first + 1000]
+            writer.append_columns(memory)
+    assert_same(read(path)[1], columns, rounded="mcpl" in name)
+
+
+@FORMS
+@pytest.mark.parametrize("attribute", ["a = b", "two\nlines", "columns", "crc32", "format"])
+def test_an_attribute_that_would_not_be_read_back_is_refused_before_anything_is_written(tmp_path, name, attribute):
+    write_muons(tmp_path / "muons.h5", Muons.empty(0), {"depth_m": 1.0, "medium": "rock", attribute: "kept"})
+    path = tmp_path / f"other.{name}"
+    if name == "h5":
+        convert_file(tmp_path / "muons.h5", path)
+        assert read(path)[0][attribute] == "kept"
+        return
+    with pytest.raises(RefusedError, match="has a name that no other format than HDF5 can hold"):
+        convert_file(tmp_path / "muons.h5", path)
+    assert list(tmp_path.iterdir()) == [tmp_path / "muons.h5"]
+
+
+@FORMS
+def test_a_text_that_hdf5_gives_as_bytes_is_a_text(tmp_path, name):
+    about = {"depth_m": 1.0, "medium": "rock", "note": np.bytes_("µ".encode())}
+    write_muons(tmp_path / "muons.h5", Muons.empty(0), about)
+    convert_file(tmp_path / "muons.h5", tmp_path / f"other.{name}")
+    assert read(tmp_path / f"other.{name}")[0]["note"] in ("µ", "µ".encode())
 
 
 @settings(deadline=None, max_examples=30)

@@ -12,10 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from onnx import TensorProto, helper, numpy_helper
+from support.analytic_family import analytic_family
 from support.damage import DAMAGES
 from support.tiny_families import tiny_family, tiny_tables
 
-from deepmuon_runtime import Generator, RefusedError
+from deepmuon_runtime import Box, Generator, RefusedError
 from deepmuon_runtime.model.baking import bake
 from deepmuon_runtime.model.family import at_depth
 from deepmuon_runtime.model.opening import checked_model, load_model
@@ -105,6 +106,24 @@ def test_a_depth_that_goes_with_the_latents_is_refused_in_one_line():
     with pytest.raises(RefusedError, match=r"can't be baked|no ONNX model that can be run") as refused:
         bake(model.SerializeToString(), 10)
     assert "\n" not in str(refused.value)
+
+
+def test_a_family_whose_nodes_of_the_depth_are_not_named_so_is_refused_in_one_line():
+    model = onnx.load_from_string(analytic_family())
+    for node in model.graph.node:
+        node.name = node.name.removeprefix("depth/")
+    with pytest.raises(RefusedError, match=r"can't be baked: no node .* has a name that begins with depth/") as refused:
+        bake(model.SerializeToString(), 10)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_body_takes_the_muons_of_a_family_baked_for_a_sphere(tmp_path: Path):
+    family, baked = opened(tmp_path, analytic_family(), 10), opened(tmp_path, bake(analytic_family(), 10, 1))
+    box = Box(0.4, 0.4, 0.3)
+    assert baked.rate(target=box) == family.rate(target=box)
+    one, two = (generator.sample(20_000, seed=1, target=box) for generator in (family, baked))
+    for name, column in one.columns.items():
+        np.testing.assert_array_equal(column, two.columns[name])
 
 
 def test_tables_of_another_type_are_refused():

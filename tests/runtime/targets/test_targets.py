@@ -118,6 +118,14 @@ def test_a_body_of_ones_own_is_hit_as_the_same_one_of_deepmuons():
     assert (own.name, own.size) == ("Ball", (1.5,))
 
 
+@given(st.integers(0, 2**32))
+def test_a_body_may_fill_the_sphere_around_it_and_not_reach_out_of_it(seed: int):
+    u, v, w = directions(10_000, seed)
+    assert Ball(1.0, 1.0).enters(u, v, w, numbers(10_000, seed + 1)).hits.mean() > 0.99
+    with pytest.raises(RefusedError, match=r"the Ball reaches .* m out of the sphere of 0\.9 m that should hold"):
+        Ball(1.0, 0.9).enters(u, v, w, numbers(10_000, seed + 1))
+
+
 @pytest.mark.parametrize("size", [0, -1, math.nan, math.inf, "2", True, None, 1e9])
 @pytest.mark.parametrize("make", [Sphere, lambda x: Box(1, x, 1), lambda x: Cylinder(1, x), lambda x: Plane(x, 1)])
 def test_a_size_that_is_none_is_refused(make, size):

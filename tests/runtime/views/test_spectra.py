@@ -39,6 +39,10 @@ def test_muons_are_counted_in_their_bins(write, monkeypatch, piece):
     assert at == {0.95: 1, 0.5: 1, 0.45: 1, 0: 1}
 
 
+def test_the_rate_of_a_sphere_is_none_of_a_horizontal_plane(write):
+    assert count_spectra(write(MUONS, rate_hz_per_m2=50.0, surface=1)).rate is None
+
+
 def test_a_file_without_a_muon_is_refused(write):
     with pytest.raises(RefusedError, match="holds no muon"):
         count_spectra(write(Muons.empty(0)))

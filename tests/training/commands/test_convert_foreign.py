@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 import uproot
 from support.mcpl_file import mcpl_file
+from support.tiny_families import tiny_family
+from support.tiny_models import tiny_model
 
-from deepmuon_runtime import Muons, read_attributes, read_muons, write_muons
+from deepmuon_runtime import Generator, Muons, Plane, Sphere, read_attributes, read_muons, write_muons
 from deepmuon_runtime.muon_file.check import check_file
 from deepmuon_training.fluxes.ecomug import sea_level_muons
 
@@ -89,6 +91,31 @@ def test_the_text_of_deepmuon_convert_comes_back_with_all_that_is_known_and_no_o
     line = f"muons.csv, columns E [{units}], u, v, w, pdg_id: 500 rows"
     assert second["provenance"] == ["made", "cut", line]
     assert same_columns(read_muons(tmp_path / "second.h5"), muons)
+
+
+def test_muons_of_a_live_time_on_a_rectangle_are_those_on_its_area(run, tmp_path):
+    (tmp_path / "model.onnx").write_bytes(tiny_model())
+    Generator.open(file=tmp_path / "model.onnx").write(tmp_path / "muons.csv", target=Plane(2, 4), live_time=3, seed=1)
+    assert run("deepmuon-train convert muons.csv --format csv -o muons.h5")[0] == 0
+    report = check_file(tmp_path / "muons.h5")
+    assert report.defects == []
+    known = [report.attributes[name] for name in ("live_time_s", "area_m2", "rate_hz_per_m2")]
+    assert known == pytest.approx([3, 8, 55.5])
+    lines = (tmp_path / "muons.csv").read_text().splitlines()
+    (tmp_path / "part.csv").write_text("\n".join(lines[:-5]) + "\n")
+    code, out, err = run("deepmuon-train convert part.csv --format csv -o part.h5")
+    assert (code, "their rate is left out" in err) == (0, True)
+    assert out.splitlines()[0].endswith("rate unknown")
+
+
+def test_muons_that_hit_a_body_are_none_of_a_plane(run, tmp_path):
+    (tmp_path / "family.onnx").write_bytes(tiny_family())
+    Generator.open(file=tmp_path / "family.onnx").write(tmp_path / "muons.csv", 10, target=Sphere(0.1))
+    code, _, err = run("deepmuon-train convert muons.csv --format csv -o muons.h5")
+    assert code == 2
+    assert err.startswith(
+        "deepmuon-train: muons.csv has muons that hit a sphere, and a sample's cross a horizontal plane"
+    )
 
 
 @pytest.mark.parametrize(

@@ -60,6 +60,7 @@ def test_generators_become_a_family_that_is_scored_between_them(folder):
     assert (scored.returncode, scored.stderr) == (0, "")
     found = Evaluation.from_json((folder / "sphere.json").read_text())
     assert found.surface == 1
+    assert "quantile, 2.5 m of water through a sphere" in (folder / "sphere.html").read_text()
     assert max(abs(tail.pull) for tail in found.tails) < 4.5  # its own training muons: alike, and more so
     wrong = run(folder, "evaluate", "family.onnx", "held_out.h5", "--depth", "3", "-o", "other.html")
     assert wrong.returncode == 2

@@ -225,7 +225,7 @@ def _read_table(path: Path, form: str, stated: dict[str, Any]) -> tuple[Sample, 
         **({} if stated["source"] is None else {"source": stated["source"]}),
         "provenance": [*known.get("provenance", ()), *told],
     }
-    sample = drop_lowest(sample_of(muons, attributes), columns.unit)
+    sample = drop_lowest(sample_of(muons, attributes, path), columns.unit)
     return _with_rate(sample, stated), {name: known[name] for name in EXPOSURE if name in known}
 
 

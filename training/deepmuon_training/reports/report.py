@@ -11,7 +11,7 @@ from math import hypot, sqrt
 
 from matplotlib.figure import Figure
 
-from deepmuon_runtime.model.metadata import Model
+from deepmuon_runtime.model.metadata import SPHERE, Model
 from deepmuon_training.data.cry_cells import COS_ZENITH_EDGES
 from deepmuon_training.reports.pictures import draw_charge, draw_energy, draw_zenith
 from deepmuon_training.sample import Sample
@@ -70,7 +70,8 @@ def html_report(evaluation: Evaluation, model: Model, held_out: Sample, held_out
     The same bytes for the same arguments.
     """
     scores = scorecard(evaluation, model.architecture)
-    title = f"{model.architecture}, {model.depth_m:g} m of {model.medium}"
+    through = " through a sphere" if evaluation.surface == SPHERE else ""
+    title = f"{model.architecture}, {model.depth_m:g} m of {model.medium}{through}"
     body = [
         f"<h1>{escape(title)}</h1>",
         f"<p>{escape(model.name)} against {escape(held_out_name)}</p>",
@@ -96,7 +97,7 @@ def html_report(evaluation: Evaluation, model: Model, held_out: Sample, held_out
         "held-out muons with its root mean square in alike samples.</p>",
         _table(("energy", "order", "generated", "held out", "difference", "alike samples"), _harmonics(evaluation)),
         "<h2>The model</h2>",
-        _table(("what", "value"), _model_facts(model)),
+        _table(("what", "value"), _model_facts(model, evaluation.surface)),
         "<h2>The held-out muons</h2>",
         _table(("what", "value"), _sample_facts(held_out, held_out_name)),
     ]
@@ -147,8 +148,10 @@ def _cos_zenith(evaluation: Evaluation) -> list[tuple[str, ...]]:
     ]
 
 
-def _model_facts(model: Model) -> list[tuple[str, str]]:
+def _model_facts(model: Model, surface: int) -> list[tuple[str, str]]:
+    """Return what a model says of itself, where a family has the surface that was scored."""
     known = {"file": model.name, "sha256": model.sha256, "size": f"{model.size:,} bytes", **model.metadata}
+    known |= {"surface": str(surface)} if "surface" in known else {}
     return [(name, str(value)) for name, value in known.items()]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Mapping
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muon_file.attributes import sound_attributes
 from deepmuon_training.data.foreign.table import Table
+from deepmuon_training.sample import PLANE
 
 __all__ = ["EXPOSURE", "check_stated", "known_of", "of_all_rows"]
 
@@ -16,6 +18,9 @@ RATE = ("rate_hz_per_m2", "rate_uncertainty_hz_per_m2")
 
 EXPOSURE = ("live_time_s", "area_m2")
 """Of muons that were made for a live time on an area."""
+
+TARGET_RATE = ("target_rate_hz", "target_rate_uncertainty_hz")
+"""How many muons a second hit a target, and the uncertainty."""
 
 OPTIONS = {"depth": "depth_m", "medium": "medium", "rate": RATE[0], "rate_uncertainty": RATE[1]}
 """Which attribute each option states."""
@@ -38,6 +43,8 @@ def known_of(table: Table) -> dict[str, Any]:
     for name in ("depth_m", "medium", "created_by", "count"):
         if name not in known:
             raise RefusedError(f"{table.path}: the comments of deepmuon-convert say no {name}")
+    if known.get("target") == PLANE and known.keys() >= {"target_size_m", EXPOSURE[0]}:
+        known[EXPOSURE[1]] = math.prod(known["target_size_m"])
     return known
 
 
@@ -45,13 +52,13 @@ def of_all_rows(table: Table, known: dict[str, Any], rows: int) -> dict[str, Any
     """Return what is known of the rows that are there: no rate, where some are missing or were added."""
     if not known or known["count"] == rows:
         return known
-    if RATE[0] in known:
+    if not known.keys().isdisjoint((RATE[0], TARGET_RATE[0])):
         warnings.warn(
             f"{table.path} has {rows:,} muons, and its comments speak of {known['count']:,}: their rate is left out, "
             "state one by --rate",
             stacklevel=2,
         )
-    return {name: value for name, value in known.items() if name not in (*RATE, *EXPOSURE)}
+    return {name: value for name, value in known.items() if name not in (*RATE, *TARGET_RATE, *EXPOSURE)}
 
 
 def check_stated(table: Table, known: Mapping[str, Any], stated: Mapping[str, Any]) -> None:
