@@ -40,7 +40,7 @@ TORCH = "torch==2.13.0"
 """Installed before whatever needs torch, in the version whose build for the CPU alone a machine may keep."""
 
 ENGINES = "onnxruntime-node,onnxruntime-web,openvino,opencv-python-headless,tract"
-LARGEST_WHEEL = 5_000_000  # bytes
+LARGEST_WHEEL = 20_000_000  # bytes
 
 WITHOUT_TORCH = """
 from importlib.util import find_spec
