@@ -8,7 +8,8 @@ import pytest
 
 from deepmuon_runtime import Generator
 from deepmuon_runtime.model.metadata import Model
-from deepmuon_training.release.card import GENERAL_LIMITS, card, manifest_entry
+from deepmuon_training.release.card import card, manifest_entry
+from deepmuon_training.release.flux_notes import flux_notes
 from deepmuon_training.scores.evaluate import evaluate
 from deepmuon_training.scores.scorecard import markdown_scorecard
 
@@ -63,8 +64,8 @@ def test_a_card_shows_the_scores_by_the_architectures_targets(text, evaluation, 
 
 def test_a_card_names_every_limit_its_own_first(text):
     limits = text[text.index("## Limits") :].splitlines()[2:]
-    assert limits == [f"- {limit}" for limit in ("Only known to 1 TeV.", *GENERAL_LIMITS)]
+    assert limits == [f"- {limit}" for limit in ("Only known to 1 TeV.", *flux_notes(None).limits)]
 
 
 def test_a_card_credits_the_source_of_the_muons(text):
-    assert "Lawrence Livermore National Laboratory" in text
+    assert flux_notes(None).credit in text

@@ -9,8 +9,9 @@ from deepmuon_training.export.family_export import export_family
 from deepmuon_training.export.metadata import Training
 from deepmuon_training.families.rates import KnownRate
 from deepmuon_training.generators.quantile.family import quantile_family
-from deepmuon_training.release.card import GENERAL_LIMITS, manifest_entry
+from deepmuon_training.release.card import manifest_entry
 from deepmuon_training.release.family_card import family_card
+from deepmuon_training.release.flux_notes import flux_notes
 from deepmuon_training.scores.model_evaluation import evaluate_model
 
 
@@ -64,4 +65,4 @@ def test_its_muons_through_a_sphere_have_scores_of_their_own(text):
 def test_it_ends_with_its_limits(text):
     assert "1. to 2 m\n" in text
     assert "```\npython make_family.py\n```" in text
-    assert text.index("- Dense near the surface.") < text.index(f"- {GENERAL_LIMITS[0]}")
+    assert text.index("- Dense near the surface.") < text.index(f"- {flux_notes(None).limits[0]}")

@@ -9,21 +9,11 @@ from pathlib import Path
 import onnx
 
 from deepmuon_runtime.model.metadata import METADATA_PREFIX
+from deepmuon_training.release.flux_notes import flux_notes
 from deepmuon_training.scores.evaluation import Evaluation
 from deepmuon_training.scores.scorecard import markdown_scorecard
 
-__all__ = ["GENERAL_LIMITS", "card", "manifest_entry"]
-
-GENERAL_LIMITS = (
-    "Single muons: no bundles of one shower, no arrival times.",
-    "Geant4's muon-nuclear interaction is left out; the overburden is a flat, laterally infinite slab of fresh water.",
-    "CRY's flux is 16 % below what BESS-TeV measured near the vertical; its charge ratio is 1.07 at sea level, falling "
-    "with energy and depth, instead of 1.2 and rising; no east-west effect, and one date and latitude.",
-    "The rate's uncertainty is statistical. What is systematic is far more: 15 % of the flux at sea level; 0.2 % at "
-    "50 m and 5 % at 1000 m for the muon-nuclear interaction.",
-    "Near the horizon few muons were there to learn from: not beyond 81 degrees (cos zenith below 0.15).",
-)
-"""What no model trained on CRY and Geant4 knows."""
+__all__ = ["card", "manifest_entry"]
 
 
 def manifest_entry(path: Path) -> dict[str, str | int]:
@@ -52,6 +42,7 @@ def card(model: Path, evaluation: Evaluation, *, command: str, provenance: Seque
         What is particular to this model: differences between table and network, ends of the tables, and the like.
     """
     metadata = manifest_entry(model)
+    known = flux_notes(str(metadata["flux"]) if "flux" in metadata else None)
     held_out, generated = evaluation.held_out_muons, evaluation.generated_muons
     return "\n".join(
         [
@@ -71,7 +62,7 @@ def card(model: Path, evaluation: Evaluation, *, command: str, provenance: Seque
             command,
             "```",
             "",
-            "CRY is by Lawrence Livermore National Laboratory (UCRL-CODE-227323, BSD-style licence).",
+            known.credit,
             "",
             "## Scores",
             "",
@@ -82,7 +73,7 @@ def card(model: Path, evaluation: Evaluation, *, command: str, provenance: Seque
             "",
             "## Limits",
             "",
-            *(f"- {limit}" for limit in (*notes, *GENERAL_LIMITS)),
+            *(f"- {limit}" for limit in (*notes, *known.limits)),
             "",
         ]
     )

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from deepmuon_training.export.metadata import Training
-from deepmuon_training.release.card import GENERAL_LIMITS, manifest_entry
+from deepmuon_training.release.card import manifest_entry
+from deepmuon_training.release.flux_notes import flux_notes
 from deepmuon_training.scores.evaluation import Evaluation
 from deepmuon_training.scores.histograms import TailScore, compare_horizon
 
@@ -46,10 +47,11 @@ def family_card(
     """
     said = manifest_entry(model)
     range_ = f"{said['depth_min_m']} to {said['depth_max_m']} m"
+    known = flux_notes(str(said["flux"]) if "flux" in said else None)
     depths = {np.float32(knot.depth_m) for knot in knots}  # 0.1 and 0.2 m of water make no 0.3 in double precision
     return "\n".join(
         [
-            f"# {said['architecture']}, {range_} of {said['medium']}",
+            f"# {said['architecture']}, {range_} of {said['medium']}{', flux ' + str(said['flux']) if 'flux' in said else ''}",
             "",
             f"Muons under any depth of {range_} of {said['medium']} ({knots[-1].medium} in Geant4), by the "
             f"`{said['architecture']}` architecture: a family.",
@@ -72,7 +74,7 @@ def family_card(
             command,
             "```",
             "",
-            "CRY is by Lawrence Livermore National Laboratory (UCRL-CODE-227323, BSD-style licence).",
+            known.credit,
             "",
             "## Scores",
             "",
@@ -91,7 +93,7 @@ def family_card(
             "",
             "## Limits",
             "",
-            *(f"- {limit}" for limit in (*notes, *GENERAL_LIMITS)),
+            *(f"- {limit}" for limit in (*notes, *known.limits)),
             "",
         ]
     )
