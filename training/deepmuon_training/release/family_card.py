@@ -47,11 +47,12 @@ def family_card(
     """
     said = manifest_entry(model)
     range_ = f"{said['depth_min_m']} to {said['depth_max_m']} m"
-    known = flux_notes(str(said["flux"]) if "flux" in said else None)
+    flux = str(said["flux"]) if "flux" in said else None
+    known, of_flux = flux_notes(flux), "" if flux is None else f", flux {flux}"
     depths = {np.float32(knot.depth_m) for knot in knots}  # 0.1 and 0.2 m of water make no 0.3 in double precision
     return "\n".join(
         [
-            f"# {said['architecture']}, {range_} of {said['medium']}{', flux ' + str(said['flux']) if 'flux' in said else ''}",
+            f"# {said['architecture']}, {range_} of {said['medium']}{of_flux}",
             "",
             f"Muons under any depth of {range_} of {said['medium']} ({knots[-1].medium} in Geant4), by the "
             f"`{said['architecture']}` architecture: a family.",
