@@ -65,7 +65,7 @@ Row = tuple[str, ...]
 @click.option("--processes", default=2, show_default=True, help="Of mulder side by side.")
 def main(cry: Path, processes: int) -> None:
     """Count, integrate, write."""
-    rows = [("", "measured", *ORDER), *at_sea_level(read_cry(cry))]
+    rows = [("", "BESS-TeV", *ORDER), *at_sea_level(read_cry(cry))]
     with Workers(OVERBURDENS["water"], processes) as workers:
         rows += [under_water(depth, workers) for depth in WATER]
     with Workers(OVERBURDENS["rock"], processes) as workers:
