@@ -9,7 +9,7 @@ itself; two minutes on two cores.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,7 +26,7 @@ from deepmuon_training.fluxes.gccly import gccly
 from deepmuon_training.fluxes.measured import MEASURED
 from deepmuon_training.fluxes.plane import plane_rate
 from deepmuon_training.sample import Sample
-from deepmuon_training.underground.integration import plane_integral, vertical_integral
+from deepmuon_training.underground.integration import Integral, plane_integral, vertical_integral
 from deepmuon_training.underground.overburden import OVERBURDENS
 from deepmuon_training.underground.place import Place, place
 from deepmuon_training.underground.workers import Workers
@@ -35,6 +35,9 @@ from studies.shared.report import write
 
 FLUXES = {"`measured`": MEASURED, "EcoMug": ecomug(), "mulder": gccly()}
 ORDER = ("`measured`", "CRY", "EcoMug", "mulder", "MUTE")
+DEEP = ("`measured`", "mulder")
+"""Fluxes that go far enough for kilometres of rock."""
+
 BANDS = ((0.5, 2), (2, 10), (10, 100), (100, 500))
 """Momenta [GeV/c] between which BESS-TeV's bins are added."""
 
@@ -69,7 +72,7 @@ def main(cry: Path, processes: int) -> None:
     with Workers(OVERBURDENS["water"], processes) as workers:
         rows += [under_water(depth, workers) for depth in WATER]
     with Workers(OVERBURDENS["rock"], processes) as workers:
-        rows += [row for depth in ROCK for row in under_rock(depth, workers)]
+        rows += [under_rock(depth, workers) for depth in ROCK]
         rows += beside_mute(workers)
     write(Path(__file__), {"rows": rows}, rows)
 
@@ -137,12 +140,17 @@ def at(flux: Flux, medium: str, depth_kmwe: float) -> Place:
     return place(flux, overburden, 1e3 * depth_kmwe / overburden.density)
 
 
+def integrals(names: Iterable[str], medium: str, depth_kmwe: float, workers: Workers) -> dict[str, Integral]:
+    """Integrate what some fluxes send through a horizontal plane at a depth [km w.e.]."""
+    return {
+        name: plane_integral(at(FLUXES[name], medium, depth_kmwe), workers, seed=SEED, precision=PRECISION)
+        for name in names
+    }
+
+
 def under_water(depth_m: float, workers: Workers) -> Row:
     """Return the rates under so many metres of water."""
-    found = {}
-    for name, flux in FLUXES.items():
-        one = plane_integral(at(flux, "water", 1e-3 * depth_m), workers, seed=SEED, precision=PRECISION)
-        found[name] = f"{one.value:.2f}"
+    found = {name: f"{one.value:.2f}" for name, one in integrals(FLUXES, "water", 1e-3 * depth_m, workers).items()}
     try:
         rate = Generator.open(depth_m).model.rate_hz_per_m2
     except RefusedError:  # no model is so deep
@@ -150,30 +158,27 @@ def under_water(depth_m: float, workers: Workers) -> Row:
     return row(f"{depth_m:g} m of water, per m² and s", found if rate is None else {**found, "CRY": f"{rate:.2f}"})
 
 
-def under_rock(depth_kmwe: float, workers: Workers) -> Iterator[Row]:
-    """Yield the vertical intensities and the charge ratio under so much standard rock."""
+def under_rock(depth_kmwe: float, workers: Workers) -> Row:
+    """Return the vertical intensities under so much standard rock."""
     found = {
         name: vertical_integral(at(FLUXES[name], "rock", depth_kmwe), workers, seed=SEED, precision=PRECISION)
-        for name in ("`measured`", "mulder")
+        for name in DEEP
     }
     intensities = {name: f"{1e-4 * one.value:.3g}" for name, one in found.items()}
-    yield row(f"{depth_kmwe:g} km w.e. of rock, vertical, per cm², s and sr", intensities)
+    return row(f"{depth_kmwe:g} km w.e. of rock, vertical, per cm², s and sr", intensities)
 
 
 def beside_mute(workers: Workers) -> Iterator[Row]:
     """Yield what MUTE's examples give."""
     depth, total = MUTE_TOTAL
-    found = {}
-    for name in ("`measured`", "mulder"):
-        one = plane_integral(at(FLUXES[name], "rock", depth), workers, seed=SEED, precision=PRECISION)
-        found[name] = f"{1e-4 * float((one.weights / one.trials.cos_zenith).mean()):.3g}"
-    yield row(f"{depth:g} km w.e. of rock, all angles, per cm² and s", {**found, "MUTE": f"{total:.3g}"})
+    totals = {
+        name: f"{1e-4 * float((one.weights / one.trials.cos_zenith).mean()):.3g}"
+        for name, one in integrals(DEEP, "rock", depth, workers).items()
+    }
+    yield row(f"{depth:g} km w.e. of rock, all angles, per cm² and s", {**totals, "MUTE": f"{total:.3g}"})
     depth, energy = MUTE_MEAN_ENERGY
-    found = {}
-    for name in ("`measured`", "mulder"):
-        one = plane_integral(at(FLUXES[name], "rock", depth), workers, seed=SEED, precision=PRECISION)
-        found[name] = f"{one.mean_energy:.0f}"
-    yield row(f"{depth:g} km w.e. of rock, mean energy, GeV", {**found, "MUTE": f"{energy:.0f}"})
+    energies = {name: f"{one.mean_energy:.0f}" for name, one in integrals(DEEP, "rock", depth, workers).items()}
+    yield row(f"{depth:g} km w.e. of rock, mean energy, GeV", {**energies, "MUTE": f"{energy:.0f}"})
 
 
 if __name__ == "__main__":

@@ -10,24 +10,19 @@ from typing import Any
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.model.metadata import HORIZONTAL_PLANE
+from deepmuon_runtime.muon_file.place_and_time import cuts_of
 from deepmuon_runtime.muon_file.reader import read_attributes, read_muons
 from deepmuon_runtime.muon_file.writer import write_muons
 from deepmuon_runtime.muons import Muons
+from deepmuon_runtime.targets.plane import Plane
 from deepmuon_training.medium import geant4_medium
 
 __all__ = [
-    "PLANE",
     "Sample",
     "read_sample",
     "sample_of",
     "write_sample",
 ]
-
-CUTS = ("energy_min_gev", "energy_max_gev", "zenith_min_degrees", "zenith_max_degrees")
-"""What a muon file says of the cuts that its muons are within."""
-
-PLANE = "plane"
-"""The target whose muons are those of a horizontal plane, at a rate of its own."""
 
 
 @dataclass(frozen=True)
@@ -120,17 +115,20 @@ def sample_of(muons: Muons, attributes: Mapping[str, Any], path: str | Path) -> 
     RefusedError
         If they say that the muons came through a sphere or into a body.
     """
-    if attributes.get("surface", HORIZONTAL_PLANE) != HORIZONTAL_PLANE or attributes.get("target", PLANE) != PLANE:
+    if (
+        attributes.get("surface", HORIZONTAL_PLANE) != HORIZONTAL_PLANE
+        or attributes.get("target", Plane.name) != Plane.name
+    ):
         what = f"that hit a {attributes['target']}" if "target" in attributes else "through a sphere"
         raise RefusedError(f"{path} has muons {what}, and a sample's cross a horizontal plane: make it without a body")
     rate, uncertainty = attributes.get("rate_hz_per_m2"), attributes.get("rate_uncertainty_hz_per_m2")
-    if attributes.get("target") == PLANE and "target_size_m" in attributes:
+    if attributes.get("target") == Plane.name and "target_size_m" in attributes:
         area = math.prod(attributes["target_size_m"])
         names = ("target_rate_hz", "target_rate_uncertainty_hz")
         rate, uncertainty = (attributes[name] / area if name in attributes else None for name in names)
     smoothed, variance_factor = attributes.get("smoothed"), attributes.get("variance_factor")
     flux = attributes.get("flux")
-    cuts = ", ".join(f"{name} {attributes[name]:g}" for name in CUTS if name in attributes)
+    cuts = ", ".join(f"{name} {bound:g}" for name, bound in cuts_of(attributes).attributes.items())
     return Sample(
         muons=muons,
         depth_m=float(attributes["depth_m"]),

@@ -31,6 +31,10 @@ class Maker(Protocol):
     block_draws: int
 
     @property
+    def block_muons(self) -> int:
+        """The muons of a block."""
+
+    @property
     def arrays(self) -> Any:
         """The module that makes arrays: numpy, or CuPy."""
 

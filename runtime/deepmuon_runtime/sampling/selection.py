@@ -112,7 +112,7 @@ class Selection:
         FailedError
             If the model gives an unphysical muon.
         """
-        size = self._attempts.muons if self.rejects else self._maker.block_draws * self.source.model.muons_per_draw
+        size = self._attempts.muons if self.rejects else self._maker.block_muons
         done = 0
         while done < len(muons):
             stopped()

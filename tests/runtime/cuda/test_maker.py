@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from contextlib import closing
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +11,11 @@ import onnxruntime
 import pytest
 from support import cuda_emulation
 from support.analytic_family import analytic_family
+from support.ball import Ball
 from support.tiny_models import RARELY_BAD, tiny_model
 
 from deepmuon_runtime import (
     Box,
-    ConvexBody,
     Cuts,
     Cylinder,
     FailedError,
@@ -113,19 +112,6 @@ def test_a_file_and_chunks_come_from_the_gpu(model_file, tmp_path):
     assert_same(read_muons(tmp_path / "muons.h5"), whole)
     assert_same(Muons.concatenate(list(generator.chunks(N, seed=3))), whole)
     assert generator.sample(0, on_device=True).kinetic_energy.shape == (0,)
-
-
-@dataclass(frozen=True)
-class Ball(ConvexBody):
-    """A sphere in a larger one, by functions that CuPy has too."""
-
-    ball: float
-    radius: float
-
-    def path(self, x, y, z, u, v, w):
-        along = x * u + y * v + z * w
-        under_root = along**2 - (x**2 + y**2 + z**2 - self.ball**2)
-        return np.where(under_root >= 0, -along - np.sqrt(under_root), np.nan)
 
 
 class BallOfNumpy(Ball):

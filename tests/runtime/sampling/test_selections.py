@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.analytic_family import MEAN_COS, MEAN_SIN, PLANE_RATE, SPHERE_RATE, analytic_family
+from support.ball import Ball
 from support.tiny_models import tiny_model
 
 from deepmuon_runtime import (
@@ -75,18 +75,6 @@ def are_equal(a: Muons, b: Muons) -> bool:
     return a.columns.keys() == b.columns.keys() and all(
         np.array_equal(column, b.columns[name]) for name, column in a.columns.items()
     )
-
-
-@dataclass(frozen=True)
-class Ball(ConvexBody):
-    """A sphere that somebody describes anew, in a larger one."""
-
-    ball: float
-    radius: float
-
-    def path(self, x, y, z, u, v, w):
-        along = x * u + y * v + z * w
-        return -along - np.sqrt(along**2 - (x**2 + y**2 + z**2 - self.ball**2))
 
 
 # Mean projected areas by formula: of top and side, and of the plane's own flux.

@@ -1,31 +1,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.ball import Ball
 
-from deepmuon_runtime import Box, ConvexBody, Cylinder, Plane, RefusedError, Sphere, Target
+from deepmuon_runtime import Box, Cylinder, Plane, RefusedError, Sphere, Target
 from deepmuon_runtime.targets.by_name import target_of
 
 SIZE = st.floats(0.01, 1000)
 BODIES = st.one_of(st.builds(Sphere, SIZE), st.builds(Box, SIZE, SIZE, SIZE), st.builds(Cylinder, SIZE, SIZE))
 TARGETS = st.one_of(BODIES, st.builds(Plane, SIZE, SIZE))
-
-
-@dataclass(frozen=True)
-class Ball(ConvexBody):
-    """A sphere that somebody describes anew, in a larger one."""
-
-    ball: float
-    radius: float
-
-    def path(self, x, y, z, u, v, w):
-        along = x * u + y * v + z * w
-        return -along - np.sqrt(along**2 - (x**2 + y**2 + z**2 - self.ball**2))
 
 
 def directions(n: int, seed: int = 1) -> list[np.ndarray]:

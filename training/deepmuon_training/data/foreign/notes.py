@@ -9,8 +9,8 @@ from typing import Any
 
 from deepmuon_runtime.errors import RefusedError
 from deepmuon_runtime.muon_file.attributes import sound_attributes
+from deepmuon_runtime.targets.plane import Plane
 from deepmuon_training.data.foreign.table import Table
-from deepmuon_training.sample import PLANE
 
 __all__ = ["EXPOSURE", "check_stated", "known_of", "of_all_rows"]
 
@@ -43,7 +43,7 @@ def known_of(table: Table) -> dict[str, Any]:
     for name in ("depth_m", "medium", "created_by", "count"):
         if name not in known:
             raise RefusedError(f"{table.path}: the comments of deepmuon-convert say no {name}")
-    if known.get("target") == PLANE and known.keys() >= {"target_size_m", EXPOSURE[0]}:
+    if known.get("target") == Plane.name and known.keys() >= {"target_size_m", EXPOSURE[0]}:
         known[EXPOSURE[1]] = math.prod(known["target_size_m"])
     return known
 
