@@ -77,7 +77,7 @@ def models_of(architecture: str | None = None, flux: str | None = None, medium: 
     """
     models = _of_architecture(architecture)
     flux, medium = DEFAULT_FLUX if flux is None else flux, DEFAULT_MEDIUM if medium is None else medium
-    found = [model for model in models if _is_of(model, flux, medium)]
+    found = [model for model in models if (model.flux, model.medium) == (flux, medium)]
     if not found:
         sort = "model" if architecture is None else architecture
         asked = f"{_printable(flux)} in {_printable(medium)}"
@@ -172,12 +172,6 @@ def _of_architecture(architecture: str | None) -> list[Model]:
             f"no released model is a {wanted!r}: {_there_are(sorted({model.architecture for model in models}))}"
         )
     return found
-
-
-def _is_of(model: Model, flux: str, medium: str) -> bool:
-    """Tell whether a model is of a flux and a medium: one that does not say its flux is of the default ones."""
-    is_default = "flux" not in model.metadata and (flux, medium) == (DEFAULT_FLUX, DEFAULT_MEDIUM)
-    return is_default or (model.flux, model.medium) == (flux, medium)
 
 
 def _depths(models: list[Model]) -> dict[str, str]:
