@@ -87,16 +87,10 @@ PLAN: dict[str, Surface | Slab] = {
         *_chain("testing", "testing-surface-14m", (14,), 716_000),
         Surface("testing-surface-20m", 82_000_000, 31_000_000, 20),
         *_chain("testing", "testing-surface-20m", (20, 25, 30, 35), 812_000),
-        Surface("testing-0m", 81_000_000, 8_200_000),
-        *_chain("testing", "testing-0m", (0.1, 0.3, 1, 3, 6, 10), 811_000),
-        Surface("testing-surface-40m", 83_000_000, 53_500_000, 40),
-        *_chain("testing", "testing-surface-40m", (40, 50), 813_000),
-        Surface("testing-surface-0.2m", 85_000_000, 7_000_000),
-        *_chain("testing", "testing-surface-0.2m", (0.2, 0.5, 4.5, 8), 815_000),
-        Surface("testing-surface-60m", 78_000_000, 71_500_000, 60),
-        *_chain("testing", "testing-surface-60m", (60,), 718_000),
-        Surface("testing-surface-70m", 84_000_000, 180_000_000, 70),
-        *_chain("testing", "testing-surface-70m", (70, 85, 100), 814_000),
+        Surface("testing-surface-40m", 83_000_000, 40_000_000, 40),
+        *_chain("testing", "testing-surface-40m", (40, 50, 60, 70, 85, 100), 813_000),
+        Surface("testing-0m", 81_000_000, 4_100_000),
+        *_chain("testing", "testing-0m", (0.1, 0.2, 0.3, 0.5, 1, 3, 4.5, 6, 8, 10), 811_000),
     )
 }
 """By name."""
