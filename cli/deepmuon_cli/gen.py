@@ -114,13 +114,13 @@ RECORDED = (
     "--flux",
     metavar="NAME",
     shell_complete=fluxes,
-    help="At sea level: cry (the default), or measured, fitted to measurements.",
+    help="At sea level: cry, if left out (see --list).",
 )
 @click.option(
     "--medium",
     metavar="NAME",
     shell_complete=media,
-    help="Above the muons: water (the default) or rock, the standard one of 2.65 g/cm3.",
+    help="Above the muons: water, if left out (see --list).",
 )
 @click.option(
     "--architecture",
@@ -206,7 +206,7 @@ def gen(
 ) -> None:
     """Write cosmic-ray muons to a file: HDF5 (.h5), or .mcpl, .mcpl.gz, .root, .csv or .csv.gz by the end of its name.
 
-    The muons cross a horizontal plane downwards, at sea level (--depth 0) or under water or rock, or enter a body:
+    The muons cross a horizontal plane downwards, at sea level (--depth 0) or under water, or enter a body:
     kinetic energy in GeV, direction of motion (u, v, w) with z up, and pdg_id, 13 for mu- and -13 for mu+. With a
     target they have places (x, y, z) in metres from its centre, with --live-time a time in seconds.
 
@@ -225,11 +225,6 @@ def gen(
 
     \b
         deepmuon-gen --depth 10 --box 4 4 3 --live-time 60 -o tank.h5
-
-    Those of the measured flux that cross 100 m2 under a kilometre of rock in a day:
-
-    \b
-        deepmuon-gen --flux measured --medium rock --depth 1000 --live-time 86400 --area 100 -o day.h5
 
     Those of 10 GeV and more that come from 60 to 90 degrees:
 
