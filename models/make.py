@@ -1,13 +1,11 @@
-"""Makes released models of one depth again, from CRY's muons to ONNX files, cards and manifest.
+"""Makes the released `transformer` models again, from CRY's muons to ONNX files, cards and manifest.
 
     python models/make.py --cry cry_sea_level.h5 --more-cry cry_40M.h5 --work work
 
-From 30 m on the muons come from a second, larger run of CRY, of which few muons in a hundred get there.
-`quantile` ones are baked of the family that models/make_family.py makes; named by --architecture they are fitted at
-their depth alone. Steps whose result lies in the work folder are not repeated, and an interrupted fit goes on from its
-checkpoint.
-On two cores: 40 minutes to carry the muons through water, 4 for each `quantile` and 25 for each `transformer` model,
-and 2 to evaluate one.
+From 30 m on the muons come from a second, larger run of CRY, of which few muons in a hundred get there. Steps whose
+result lies in the work folder are not repeated, and an interrupted fit goes on from its checkpoint. (The `quantile`
+models are baked of the family that models/make_family.py makes.)
+On two cores: 40 minutes to carry the muons through water, 25 to fit each model, and 2 to evaluate it.
 """
 
 from __future__ import annotations
@@ -23,7 +21,6 @@ from deepmuon_training.data.cry import HELD_OUT_CRY_MUONS, read_cry
 from deepmuon_training.data.smoothing import StepSmoother, smoothed
 from deepmuon_training.generators.fit import fit_generator
 from deepmuon_training.generators.fitted import FittedGenerator, export_fitted
-from deepmuon_training.generators.registry import ARCHITECTURES
 from deepmuon_training.pipeline.step import Step, run_steps
 from deepmuon_training.release.card import card, manifest_entry
 from deepmuon_training.release.vectors import muon_vectors
@@ -37,6 +34,7 @@ REPOSITORY = Path(__file__).parents[1]
 RELEASED = REPOSITORY / "models" / "deepmuon_models"
 EVALUATIONS = REPOSITORY / "docs" / "evaluations"
 VECTORS = REPOSITORY / "tests" / "vectors"
+ARCHITECTURE = "transformer"
 SEED = 1
 EVALUATED_MUONS = 20_000_000
 DEPTHS = (0, 10, 20, 30, 40, 50)
@@ -60,29 +58,26 @@ Make = Callable[[Path, bool], None]
 @click.option("--more-cry", type=click.Path(exists=True, path_type=Path), help="More of them, for 30 m and deeper.")
 @click.option("--work", required=True, type=click.Path(path_type=Path), help="Folder for samples and checkpoints.")
 @click.option("--depth", "depths", multiple=True, type=int, default=DEPTHS, show_default=True)
-@click.option(
-    "--architecture",
-    "architectures",
-    multiple=True,
-    type=click.Choice(tuple(ARCHITECTURES)),
-    default=("transformer",),
-    show_default=True,
-)
-def main(cry: Path, more_cry: Path | None, work: Path, depths: tuple[int, ...], architectures: tuple[str, ...]) -> None:
+def main(cry: Path, more_cry: Path | None, work: Path, depths: tuple[int, ...]) -> None:
     """Make each model of each depth, then the manifest."""
     if more_cry is None and max(depths) >= DEEP:
         raise click.UsageError(f"--more-cry is needed from {DEEP} m on")
-    for folder in (work / "samples", *(work / name for name in names(depths, architectures))):
+    for folder in (work / "samples", *(work / model_name(depth) for depth in depths)):
         folder.mkdir(parents=True, exist_ok=True)
-    run_steps([*sample_steps(cry, more_cry, work, max(depths)), *model_steps(work, depths, architectures)], click.echo)
-    for name in names(depths, architectures):
-        release(work, name)
+    run_steps([*sample_steps(cry, more_cry, work, max(depths)), *model_steps(work, depths)], click.echo)
+    for depth in depths:
+        release(work, model_name(depth))
     write_manifest()
 
 
-def names(depths: tuple[int, ...], architectures: tuple[str, ...]) -> list[str]:
-    """Return the names of the models."""
-    return [f"{architecture}-{depth}m" for depth in depths for architecture in architectures]
+def model_name(depth: int) -> str:
+    """Return the name of the model of a depth [m]."""
+    return f"{ARCHITECTURE}-{depth}m"
+
+
+def depth_of(name: str) -> int:
+    """Return the depth [m] that the name of a model says."""
+    return int(name.removeprefix(f"{ARCHITECTURE}-").removesuffix("m"))
 
 
 def sample_file(work: Path, part: str, depth: int, kind: str = "") -> Path:
@@ -140,9 +135,9 @@ def transport_seed(part: str, depth: int) -> int:
     return depth + PARTS.index(part)
 
 
-def model_steps(work: Path, depths: tuple[int, ...], architectures: tuple[str, ...]) -> Iterator[Step]:
+def model_steps(work: Path, depths: tuple[int, ...]) -> Iterator[Step]:
     """Yield the steps that fit, export and score each model."""
-    for name in names(depths, architectures):
+    for name in map(model_name, depths):
         folder = work / name
         generator = folder / f"{name}.pt"
         yield Step("fit", name, generator, _fit(work, generator))
@@ -151,11 +146,9 @@ def model_steps(work: Path, depths: tuple[int, ...], architectures: tuple[str, .
 
 
 def _fit(work: Path, generator: Path) -> Make:
-    architecture, depth = architecture_and_depth(generator.stem)
-
     def make(saved: Path, progress: bool) -> None:
-        sample = read_sample(sample_file(work, "training", depth))
-        fit_generator(sample, architecture, seed=SEED, checkpoint_folder=saved, progress=progress).save(generator)
+        sample = read_sample(sample_file(work, "training", depth_of(generator.stem)))
+        fit_generator(sample, ARCHITECTURE, seed=SEED, checkpoint_folder=saved, progress=progress).save(generator)
 
     return make
 
@@ -170,7 +163,7 @@ def _export(generator: Path, model: Path) -> Make:
 
 def _score(work: Path, generator: Path) -> Make:
     """Compare 20,000,000 muons with the held-out ones."""
-    _, depth = architecture_and_depth(generator.stem)
+    depth = depth_of(generator.stem)
     raw = sample_file(work, "testing", depth, "-raw")
 
     def make(_: Path, progress: bool) -> None:
@@ -187,36 +180,31 @@ def _score(work: Path, generator: Path) -> Make:
     return make
 
 
-def architecture_and_depth(name: str) -> tuple[str, int]:
-    """Return what the name of a model says."""
-    architecture, _, depth = name.partition("-")
-    return architecture, int(depth.removesuffix("m"))
-
-
 def release(work: Path, name: str) -> None:
     """Put a model where it is released, with its test vectors, scores, pictures and card."""
-    (architecture, depth), folder, path = architecture_and_depth(name), work / name, RELEASED / f"{name}.onnx"
+    depth, folder, path = depth_of(name), work / name, RELEASED / f"{name}.onnx"
     shutil.copyfile(folder / path.name, path)
     (VECTORS / f"{name}.json").write_text(muon_vectors(path), encoding="utf-8")
     evaluation = Evaluation.from_json((folder / "evaluation.json").read_text())
     (EVALUATIONS / f"{name}.json").write_text(evaluation.to_json())
     pictures = EVALUATIONS / name
     pictures.mkdir(parents=True, exist_ok=True)
-    draw_pictures(evaluation, pictures, title=f"{architecture}, {depth} m")
+    draw_pictures(evaluation, pictures, title=f"{ARCHITECTURE}, {depth} m")
     write_card(path, evaluation, read_sample(sample_file(work, "training", depth), 0, 0), folder / "notes.json")
 
 
 def write_card(path: Path, evaluation: Evaluation, sample: Sample, notes: Path) -> None:
     """Write the model's card beside its file, and show it."""
-    architecture, depth = architecture_and_depth(path.stem)
-    more = "--more-cry cry_40M.h5 " if depth >= DEEP else ""
-    command = (
-        f"python models/make.py --cry cry_sea_level.h5 {more}--work work --depth {depth} --architecture {architecture}"
-    )
     known = json.loads(notes.read_text())
-    text = card(path, evaluation, command=command, provenance=sample.provenance, notes=known)
+    text = card(path, evaluation, command=command(depth_of(path.stem)), provenance=sample.provenance, notes=known)
     path.with_suffix(".md").write_text(text)
     click.echo(text)
+
+
+def command(depth: int) -> str:
+    """Return the command that makes the model of a depth [m]."""
+    more = "--more-cry cry_40M.h5 " if depth >= DEEP else ""
+    return f"python models/make.py --cry cry_sea_level.h5 {more}--work work --depth {depth}"
 
 
 def write_manifest() -> None:

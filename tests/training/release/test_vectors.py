@@ -7,13 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from support.engines import MODELS
 
 from deepmuon_training.export.exportable import Exportable
 from deepmuon_training.release.vectors import MARGIN, MUONS, muon_vectors
 
 REPOSITORY = Path(__file__).parents[3]
-RELEASED = sorted((REPOSITORY / "models" / "deepmuon_models").glob("*.onnx"))
-EARLIER = pytest.mark.xfail(strict=True, reason="a quantile model of before its cells were those of this exporter")
 
 
 @pytest.fixture(scope="module")
@@ -64,12 +63,7 @@ def test_all_combinations_of_end_points_are_among_the_draws_of_single_muons(vect
     assert len(np.unique(corners, axis=0)) == (2**exportable.latent_size if exportable.muons_per_draw == 1 else 0)
 
 
-@pytest.mark.parametrize(
-    "path",
-    # Until the released family is there, of which the quantile models are baked.
-    [pytest.param(path, marks=EARLIER if path.stem.startswith("quantile") else ()) for path in RELEASED],
-    ids=lambda path: path.stem,
-)
+@pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
 def test_the_vectors_of_a_released_model_are_those_of_its_file(path: Path):
     stored = json.loads((REPOSITORY / "tests" / "vectors" / f"{path.stem}.json").read_text(encoding="utf-8"))
     made = json.loads(muon_vectors(path))
@@ -81,6 +75,6 @@ def test_the_vectors_of_a_released_model_are_those_of_its_file(path: Path):
             assert stored[key] == value, key
 
 
-def test_every_file_of_vectors_has_its_released_model():
+def test_every_file_of_vectors_has_its_released_model_of_one_depth():
     stored = (REPOSITORY / "tests" / "vectors").glob("*.json")
-    assert {path.stem for path in stored} == {path.stem for path in RELEASED}
+    assert {path.stem for path in stored} == {path.stem for path in MODELS}

@@ -1,4 +1,4 @@
 """What a released model is published with: an ONNX file and its evaluation in, card, manifest and test vectors out.
 
-Only `models/make.py` and the tests need it.
+Only the programs in `models/` and the tests need it.
 """

@@ -70,7 +70,6 @@ def card(model: Path, evaluation: Evaluation, *, command: str, provenance: Seque
             "what two samples of one distribution and these sizes show.",
             "",
             markdown_scorecard(evaluation, str(metadata["architecture"])),
-            "",
             "## Limits",
             "",
             *(f"- {limit}" for limit in (*notes, *known.limits)),
