@@ -25,6 +25,8 @@ from studies.shared.report import COLOURS, write
 
 SEED = 1
 EDGES = 10 ** np.linspace(-2, 3, 51)
+ENOUGH = 10_000
+"""Held-out muons of a bin that is judged."""
 
 Float = NDArray[np.float64]
 
@@ -45,10 +47,9 @@ def main(family: Path, held_out: Path, knots: tuple[float, float], number: int) 
     above, below = (spectra[f"{knot:g} m"] for knot in knots)
     share = (mean(here) - mean(below)) / (mean(above) - mean(below))
     mixture = share * above + (1 - share) * below
-    enough = spectra["held out"] * len(truth) >= 1000
-    off = {
-        name: here_over(shape, spectra["held out"], enough) for name, shape in (("maps", here), ("mixture", mixture))
-    }
+    expected = np.where(spectra["held out"] * len(truth) >= ENOUGH, spectra["held out"], np.nan)
+    off = {"maps": here / expected - 1, "mixture": mixture / expected - 1}
+    noise = np.sqrt((1 / len(truth) + 1 / number) / expected)
     numbers = {
         "family": family.name,
         "depth_m": truth.depth_m,
@@ -59,8 +60,9 @@ def main(family: Path, held_out: Path, knots: tuple[float, float], number: int) 
         "spectra": {name: one.tolist() for name, one in spectra.items()},
         "mixture": mixture.tolist(),
         "largest_deviation": {name: float(np.nanmax(np.abs(one))) for name, one in off.items()},
+        "chi2_per_bin": {name: float(np.nanmean((one / noise) ** 2)) for name, one in off.items()},
     }
-    write(Path(__file__), numbers, figure=draw(truth.depth_m, knots, spectra, mixture, off))
+    write(Path(__file__), numbers, figure=draw(truth.depth_m, knots, spectra, off, noise))
 
 
 def spectrum(muons: Muons) -> Float:
@@ -73,13 +75,8 @@ def mean(shape: Float) -> float:
     return float(np.average(np.log(EDGES[1:] * EDGES[:-1]) / 2, weights=shape))
 
 
-def here_over(shape: Float, truth: Float, enough: NDArray[np.bool_]) -> Float:
-    """Relative deviation from the truth, where enough muons tell."""
-    return np.where(enough, shape / np.where(enough, truth, 1) - 1, np.nan)
-
-
 def draw(
-    depth: float, knots: tuple[float, float], spectra: dict[str, Float], mixture: Float, off: dict[str, Float]
+    depth: float, knots: tuple[float, float], spectra: dict[str, Float], off: dict[str, Float], noise: Float
 ) -> Figure:
     """Draw the spectra, and below them what differs from the truth."""
     with rc_context(STYLE):
@@ -91,17 +88,18 @@ def draw(
             upper.stairs(spectra[f"{knot:g} m"], EDGES, color=colour, ls=":", label=f"its knot of {knot:g} m")
         upper.set(xscale="log", ylabel="share of muons in 0.1 decade")
         upper.legend(frameon=False)
-        _draw_deviation(lower, off, depth)
+        _draw_deviation(lower, off, noise, depth)
     return figure
 
 
-def _draw_deviation(axes: Axes, off: dict[str, Float], depth: float) -> None:
+def _draw_deviation(axes: Axes, off: dict[str, Float], noise: Float, depth: float) -> None:
     names = {"maps": "maps interpolated", "mixture": "a mixture of both knots"}
+    axes.stairs(100 * noise, EDGES, baseline=-100 * noise, fill=True, alpha=0.25, color="black", label="noise")
     for (name, deviation), colour in zip(off.items(), COLOURS, strict=False):
         axes.stairs(100 * deviation, EDGES, color=colour, label=names[name], baseline=None)
     axes.axhline(0, color="black", lw=0.6)
-    axes.set(xlabel="kinetic energy / GeV", ylabel=f"off the truth at {depth:g} m / %", ylim=(-12, 12))
-    axes.legend(frameon=False)
+    axes.set(xlabel="kinetic energy / GeV", ylabel=f"off the truth at {depth:g} m / %", ylim=(-4, 4))
+    axes.legend(frameon=False, ncols=3)
 
 
 if __name__ == "__main__":

@@ -3,16 +3,16 @@
 python -m studies.families.depths EVALUATIONS FAMILY
 
 EVALUATIONS is a folder of them, DEPTHm.json and DEPTHm-sphere.json, as models/make_family.py leaves it; FAMILY the ONNX
-file. Rate and mean energy are asked of the family at 100 depths, of the same latents at each; their second differences
-in s = ln(density z + 0.7 m), the coordinate in which it interpolates, would show a kink as a peak. Writes FAMILY.json,
-FAMILY.md and FAMILY.png beside itself.
+file. Rate and mean energy are asked of the family where it is scored and at 100 depths, of the same latents at each;
+second differences in s = ln(density z + 0.7 m), the coordinate in which it interpolates, would show a kink as a peak.
+Writes FAMILY.json, FAMILY.md and FAMILY.png beside itself.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 import numpy as np
@@ -52,13 +52,33 @@ def main(evaluations: Path, family: Path, knots: str, number: int) -> None:
     contents = family.read_bytes()
     model = read_model(contents, str(family))
     density = OVERBURDENS[model.medium].density
-    curve = smoothness(contents, model, density, number)
+    latent = latents(seed=SEED, first=0, draws=number, latent_size=model.latent_size)
+    curve = smoothness(contents, model, density, latent)
+    rows = [one.row(Known.of(contents, one.depth_m, latent) if one.surface == 0 else None) for one in scored]
     numbers = {"family": family.name, "scores": [vars(one) for one in scored], "muons": number, "curve": curve}
     figure = draw(scored, curve, density, WANTED[str(model.flux)])
-    write(Path(__file__).with_name(f"{family.stem}.py"), numbers, [HEAD, *(one.row() for one in scored)], figure)
+    write(Path(__file__).with_name(f"{family.stem}.py"), numbers, [HEAD, *rows], figure)
 
 
-HEAD = ("depth / m", "", "through a", "delta / %", "KS energy", "KS cos zenith", "charge", "below cos 0.05", "rate")
+HEAD = (
+    *("depth / m", "", "through a", "delta / %", "KS energy", "KS cos zenith", "charge", "below cos 0.05"),
+    *("rate over held out", "rate / (1/m² s)", "mean energy / GeV"),
+)
+
+
+class Known(NamedTuple):
+    """What a family says of a depth, and what its muons there show."""
+
+    rate: float
+    mean_energy: float
+    mean_ln_energy: float
+
+    @classmethod
+    def of(cls, contents: bytes, depth: float, latent: NDArray[np.float32]) -> Known:
+        """Ask a family, of so many latents."""
+        session = InferenceSession(at_depth(contents, depth), providers=["CPUExecutionProvider"])
+        energy, rate = session.run(["kinetic_energy", "rate_hz_per_m2"], {"latent": latent})
+        return cls(float(rate[0]), *(float(np.mean(one, dtype=np.float64)) for one in (energy, np.log(energy))))
 
 
 @dataclass(frozen=True)
@@ -97,7 +117,7 @@ class Scored:
             found.rate.generated / found.rate.held_out if found.rate else None,
         )
 
-    def row(self) -> list[str]:
+    def row(self, known: Known | None) -> list[str]:
         """Return its row of the table."""
         return [
             f"{self.depth_m:g}",
@@ -109,27 +129,24 @@ class Scored:
             f"{self.charge:.2f}",
             "" if self.horizon is None else f"{self.horizon:.2f}",
             "" if self.rate is None else f"{self.rate:.4f}",
+            *(("", "") if known is None else (f"{known.rate:.4g}", f"{known.mean_energy:.3g}")),
         ]
 
 
-def smoothness(contents: bytes, model: Model, density: float, number: int) -> dict[str, Any]:
-    """Find rate and mean ln E at many depths, and their second differences, of the same latents at each."""
+def smoothness(contents: bytes, model: Model, density: float, latent: NDArray[np.float32]) -> dict[str, Any]:
+    """Find rate and mean energy at many depths, and second differences, of the same latents at each."""
     assert model.depth_min_m is not None
     assert model.depth_max_m is not None
     s = np.linspace(*(np.log(density * depth + OFFSET) for depth in (model.depth_min_m, model.depth_max_m)), DEPTHS)
     depths = np.clip((np.exp(s) - OFFSET) / density, model.depth_min_m, model.depth_max_m)
-    latent = latents(seed=SEED, first=0, draws=number, latent_size=model.latent_size)
-    rate, energy = [], []
-    for depth in depths.tolist():
-        session = InferenceSession(at_depth(contents, depth), providers=["CPUExecutionProvider"])
-        muons, per_second = session.run(["kinetic_energy", "rate_hz_per_m2"], {"latent": latent})
-        energy.append(float(np.mean(np.log(muons, dtype=np.float64))))
-        rate.append(float(np.log(per_second[0], dtype=np.float64)))
+    found = [Known.of(contents, depth, latent) for depth in depths.tolist()]
+    rate, energy = np.log([one.rate for one in found]), [one.mean_ln_energy for one in found]
     step = s[1] - s[0]
     return {
         "depth_m": depths.tolist(),
+        "mean_energy": [one.mean_energy for one in found],
         "mean_ln_energy": energy,
-        "ln_rate": rate,
+        "ln_rate": rate.tolist(),
         "second_difference_of_ln_rate": (np.diff(rate, 2) / step**2).tolist(),
         "second_difference_of_mean_ln_energy": (np.diff(energy, 2) / step**2).tolist(),
     }
@@ -152,6 +169,7 @@ def draw(scored: list[Scored], curve: dict[str, Any], density: float, wanted: tu
         delta.legend(frameon=False, ncols=2)
         places = density * np.array(curve["depth_m"]) + OFFSET
         rate.plot(places, np.exp(curve["ln_rate"]), color=COLOURS[0], label="rate / (1/m² s)")
+        rate.plot(places, curve["mean_energy"], color=COLOURS[1], label="mean energy / GeV")
         rate.plot(places, np.exp(curve["mean_ln_energy"]), color=COLOURS[2], label="exp(mean of ln E/GeV)")
         rate.set(yscale="log")
         rate.legend(frameon=False)
