@@ -170,7 +170,7 @@ RECORDED = (
     "--threads",
     type=thread_number,
     metavar="NUMBER",
-    help="Computing side by side; if left out, as many as may be used.",
+    help="Computing side by side; if left out, as many as may be used, and 2 on a GPU.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="No progress bar and no closing line.")
 @click.option("--list", "list_only", is_flag=True, help="List the released models.")
