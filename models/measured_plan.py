@@ -18,7 +18,7 @@ EQUIVALENTS = {"water": _KNOTS, "rock": (*_KNOTS, 6625)}
 """Knots of each [m w.e.]: 5,000 m of water, 2,500 m of rock."""
 
 MUONS = 4_000_000
-TESTING = 2_000_000
+TESTING = 1_000_000
 
 
 @dataclass(frozen=True)

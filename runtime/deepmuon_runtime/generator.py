@@ -37,6 +37,9 @@ __all__ = ["Generator"]
 MOST_EXPECTED = 1e12
 """The most muons that a live time may be expected to give."""
 
+# One copies to the computer's memory while the other's muons are made. An H200 gave 1,745 million muons a second
+# by two, 1,114 by one, 1,316 by four and 825 by eight.
+THREADS_OF_A_GPU = 2
 RARE = 1e-6  # share of the muons, below which cuts are said to be narrow
 
 
@@ -102,7 +105,7 @@ class Generator:
         device
             "cpu"; "cuda"; or "auto", which is CUDA where it can be had, else the CPU.
         threads
-            How many blocks are made side by side; as many as the process may use if left out.
+            How many blocks are made side by side; if left out, as many as the process may use, and 2 on a GPU.
 
         Raises
         ------
@@ -111,8 +114,7 @@ class Generator:
         """
         from deepmuon_runtime.model.opening import read_file
 
-        threads = _usable_processors() if threads is None else threads
-        if not isinstance(threads, Integral) or threads < 1:
+        if threads is not None and (not isinstance(threads, Integral) or threads < 1):
             raise RefusedError(f"{threads!r} threads can't make muons: 1 or more can")
         if file is not None:
             for name, chosen in {"architecture": architecture, "flux": flux, "medium": medium}.items():
@@ -125,7 +127,10 @@ class Generator:
             released = released_model(depth, architecture, flux, medium)
             name, contents = released.name, read_released(released)
             depth = depth if released.is_family else None
-        return cls(Surfaces(contents, name, depth, device, is_stranger=file is not None), threads)
+        surfaces = Surfaces(contents, name, depth, device, is_stranger=file is not None)
+        if threads is None:
+            threads = THREADS_OF_A_GPU if surfaces.own.device == "cuda" else _usable_processors()
+        return cls(surfaces, threads)
 
     def sample(
         self,

@@ -22,7 +22,7 @@ import click
 import numpy as np
 
 from deepmuon_runtime import Box, Cuts, Generator, Plane
-from studies.shared.processes import cores, machine
+from studies.shared.processes import machine
 from studies.shared.report import write
 
 ARCHITECTURES = ("quantile", "transformer")
@@ -61,8 +61,7 @@ def main() -> None:
         click.echo(f"{architecture}: {rates[architecture]}")
     processor = Generator.open(DEPTH, device="cpu")
     rates["quantile"]["in memory, by the processor"] = rate(lambda: processor.sample(ON_DEVICE, 1), ON_DEVICE)
-    processors = f"{machine()}, {cores()} cores"
-    conditions = {"gpu": gpu(), "processor": processors, "date": f"{datetime.now(UTC):%d %B %Y}"}
+    conditions = {"gpu": gpu(), "processor": machine(), "date": f"{datetime.now(UTC):%d %B %Y}"}
     conditions |= {name: version(name) for name in ("deepmuon-runtime", "onnxruntime-gpu", "cupy-cuda13x")}
     places = list(rates["quantile"])
     rows = [["millions a second", *ARCHITECTURES]]

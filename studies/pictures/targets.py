@@ -1,8 +1,9 @@
 """Where muons enter a tank, a panel and an upright wall, and how many do, beside the analytic numbers.
 
 ``python -m studies.pictures.targets [FAMILY.onnx]`` draws targets.png and writes the table targets.md, of the released
-family or of another. The analytic number of a face is made of the muons of a horizontal plane, which know nothing of
-bodies: a m2 that looks up takes each of them once, an upright one that faces n by abs(d n) / cos zenith.
+family or of another; the table has scenes too that are not drawn. The analytic number of a face is made of the muons
+of a horizontal plane, which know nothing of bodies: a m2 that looks up takes each of them once, an upright one that
+faces n by abs(d n) / cos zenith.
 """
 
 from __future__ import annotations
@@ -40,12 +41,16 @@ class Scene:
     up: float  # m2, of its top
     side: float  # m2, half of that of its sides: an upright plane of so much has their muons, taken from both sides
     cuts: Cuts = NO_CUTS
+    drawn: bool = True
 
 
 SCENES = (
     Scene("tank", Cylinder(1.9, 3.6), 10, 300, math.pi * 1.9**2, math.pi * 1.9 * 3.6),
     Scene("panel", Box(1, 1, 0.02), 10, 3600, 1, 2 * 0.02),
+    Scene("panel, above 1 GeV", Box(1, 1, 0.02), 10, 3600, 1, 2 * 0.02, Cuts(energy_min=1), drawn=False),
+    Scene("panel, upright", Box(1, 0.02, 1), 10, 3600, 0.02, 1.02, drawn=False),
     Scene("wall", Box(1, 0.02, 1), 0, 3600, 0.02, 1.02, Cuts(zenith_min=60)),
+    Scene("wall, all angles", Box(1, 0.02, 1), 0, 3600, 0.02, 1.02, drawn=False),
 )
 
 
@@ -54,7 +59,8 @@ def main(file: str | None = None) -> None:
     figure = Figure(figsize=(8, 2.9), layout="constrained")
     rows = [("target", "entered by", "muons", "a second", "analytic")]
     numbers = {}
-    for scene, axes in zip(SCENES, figure.subplots(1, 3), strict=True):
+    pictures = iter(figure.subplots(1, sum(scene.drawn for scene in SCENES)))
+    for scene in SCENES:
         generator = Generator.open(scene.depth, file=file)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the tank stands in a hall, where all of it is at one depth
@@ -72,8 +78,10 @@ def main(file: str | None = None) -> None:
             found = f"{count / scene.live_time:,.2f} ± {math.sqrt(count) / scene.live_time:.2g}"
             rows.append((scene.name, face, f"{count:,}", found, f"{analytic:,.2f}"))
         numbers[scene.name] = {"depth_m": scene.depth, "live_time_s": scene.live_time, "rate_hz": rate.hz, **faces}
-        draw(axes, muons, scene)
-        axes.set_title(f"{scene.name}: {rate.hz:,.1f} a second", fontsize=10)
+        if scene.drawn:
+            axes = next(pictures)
+            draw(axes, muons)
+            axes.set_title(f"{scene.name}: {rate.hz:,.1f} a second", fontsize=10)
     figure.colorbar(axes.collections[0], ax=figure.axes, label="zenith angle / °", aspect=30)
     write(Path(__file__), numbers, rows, figure)
 
@@ -88,7 +96,7 @@ def per_square_metre(generator: Generator, cuts: Cuts) -> tuple[float, float]:
     return rate * float(np.mean(kept)), rate * float(np.mean(kept * across / muons.cos_zenith))
 
 
-def draw(axes: Axes, muons: Muons, scene: Scene) -> None:
+def draw(axes: Axes, muons: Muons) -> None:
     """Draw places as seen from the front and above, each in the colour of its zenith angle."""
     some = muons[:SHOWN]
     x, y, z = (np.asarray(place, np.float64) for place in (some.x, some.y, some.z))

@@ -17,7 +17,7 @@ from support.tiny_models import RARELY_BAD, tiny_model
 
 from deepmuon_cli.gen import main
 from deepmuon_cli.process.signals import SIGNALS
-from deepmuon_runtime import Generator, Muons, read_attributes, read_muons
+from deepmuon_runtime import Generator, Muons, RefusedError, read_attributes, read_muons
 
 COMMAND = [sys.executable, "-m", "deepmuon_cli.gen"]
 
@@ -513,6 +513,28 @@ def test_a_bar_shows_the_progress_on_a_terminal(model_file, tmp_path):
     os.close(stderr)
     assert b"100%" in os.read(terminal, 10_000)
     os.close(terminal)
+
+
+@pytest.mark.usefixtures("released")
+@pytest.mark.parametrize(
+    ("asked", "number", "opened"),
+    [
+        ([], "1e8", "cpu"),
+        ([], "2e8", "auto"),
+        (["--architecture", "transformer"], "1e8", "auto"),
+        (["--device", "cuda"], "10", "cuda"),
+        (["--device", "cpu"], "2e8", "cpu"),
+    ],
+)
+def test_a_gpu_is_started_where_it_is_the_faster_one(gen, monkeypatch, asked, number, opened):
+    """Of the released models `quantile` is so fast on a processor that a GPU would begin too late."""
+
+    def open_on(*_: object, device: str, **__: object) -> None:
+        raise RefusedError(f"opened on {device}")
+
+    monkeypatch.setattr(Generator, "open", open_on)
+    code, _, err = gen("--depth", 10, *asked, "-n", number, "-o", "muons.h5")
+    assert (code, err.splitlines()[-1]) == (2, f"deepmuon-gen: opened on {opened}")
 
 
 def test_a_log_gets_a_line_of_progress_every_half_minute(gen, model_file, monkeypatch):

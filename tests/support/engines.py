@@ -147,7 +147,11 @@ def run_in_node(package: str, models: tuple[Path, ...]) -> dict[str, Muons]:
 def run_in_onnxruntime(model: Path, provider: Any = "CPUExecutionProvider") -> Muons:
     import onnxruntime
 
+    if provider != "CPUExecutionProvider":
+        onnxruntime.preload_dlls(directory="")  # CUDA's, as pip installs them
     session = onnxruntime.InferenceSession(model, providers=[provider])
+    asked = provider if isinstance(provider, str) else provider[0]
+    assert session.get_providers()[0] == asked, "ONNX Runtime took another device"
     return Muons(*session.run(OUTPUTS, {"latent": latents_of(model)}))
 
 

@@ -26,6 +26,7 @@ from deepmuon_runtime.targets.target import Target
 __all__ = ["Integral", "integral"]
 
 SHIFTS = 8
+POINTS = 1 << 14  # muons of a shift at once, about
 FEWEST, MOST = 1 << 19, 1 << 24  # muons
 PRECISION = {True: 3e-4, False: 3e-3}  # relative, from which on no more muons are asked, of even points and random ones
 FEW_LATENTS = 8  # to which even points are even
@@ -67,7 +68,7 @@ def integral(
     """
     model = source.model
     is_even = model.muons_per_draw == 1 and model.latent_size <= FEW_LATENTS
-    rows = block_draws(model, "cpu")  # on every device the same points: the times of a live time go by the rate
+    rows = block_draws(model, POINTS)  # on every device the same points: the times of a live time go by the rate
     sums = np.zeros(SHIFTS)
     done = 0  # draws of each shift
     made = Muons.empty(rows * model.muons_per_draw)

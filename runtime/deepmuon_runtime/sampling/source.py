@@ -26,8 +26,10 @@ if TYPE_CHECKING:
 
 __all__ = ["TRIED", "Source", "block_draws"]
 
-# Muons of one run of the network, about: what it works on stays in a CPU's cache; a GPU wants much at once.
+# Muons of one run of the network, about. What a wide network works on shall stay in a CPU's cache. Tables need little;
+# what they cost is that threads take turns at Python's lock, block by block. A GPU wants much at once.
 BLOCK = {"cpu": 1 << 14, "cuda": 1 << 18}
+BLOCK_OF_SINGLE_MUONS = {"cpu": 1 << 16, "cuda": 1 << 18}
 TRIED = 5
 """Values of the latents that are tried before the first muons: the ends, the middle, and two between."""
 
@@ -51,7 +53,7 @@ class Source:
     def __init__(self, session: onnxruntime.InferenceSession, model: Model, device: str) -> None:
         self.model = model
         self.device = device
-        self.block_draws = block_draws(model, device)
+        self.block_draws = block_draws(model, (BLOCK_OF_SINGLE_MUONS if model.muons_per_draw == 1 else BLOCK)[device])
         self._session = session
         self._own = threading.local()  # each thread's memory for its runs
 
@@ -161,9 +163,9 @@ class Source:
         np.multiply(charge[kept], np.int8(MU_PLUS), out=muons.pdg_id)
 
 
-def block_draws(model: Model, device: str) -> int:
-    """Return how many draws make a block: of large ones, which each thread has in memory, as few as one."""
+def block_draws(model: Model, muons: int) -> int:
+    """Return how many draws make a block of about so many muons; of large ones, which lie in memory, as few as one."""
     size = max(model.muons_per_draw, model.latent_size // LATENTS_PER_MUON)
     # Multiples of 8 draws where they fit: a block then begins with a whole step of the random number generator.
-    step = 8 if 8 * size <= BLOCK[device] else 1
-    return -(-BLOCK[device] // (step * size)) * step
+    step = 8 if 8 * size <= muons else 1
+    return -(-muons // (step * size)) * step

@@ -12,18 +12,17 @@ import pytest
 from support import cuda_emulation
 from support.analytic_family import analytic_family
 from support.ball import Ball
+from support.selections import SELECTIONS
 from support.tiny_models import RARELY_BAD, tiny_model
 
 from deepmuon_runtime import (
     Box,
     Cuts,
-    Cylinder,
     FailedError,
     Generator,
     Muons,
     Plane,
     RefusedError,
-    Sphere,
     check_file,
     read_muons,
 )
@@ -123,19 +122,6 @@ class BallOfNumpy(Ball):
         return found
 
 
-SELECTIONS = [
-    {"cuts": Cuts(energy_min=1, energy_max=5)},
-    {"cuts": Cuts(energy_min=1000)},
-    {"cuts": Cuts(zenith_min=30, zenith_max=60)},
-    {"cuts": Cuts(zenith_max=5)},
-    {"target": Plane(2, 3)},
-    {"target": Sphere(1.5)},
-    {"target": Sphere(1.5), "cuts": Cuts(energy_max=2)},
-    {"target": Box(4, 4, 3)},
-    {"target": Box(0.1, 5, 5), "cuts": Cuts(energy_min=1, zenith_min=20)},
-    {"target": Cylinder(1, 5), "cuts": Cuts(energy_max=2, zenith_max=70)},
-    {"target": Ball(1.0, 1.3)},
-]
 pytestmark = [
     pytest.mark.filterwarnings("ignore:the .* gets the muons of its centre"),
     pytest.mark.filterwarnings("ignore:the cuts keep 1 muon in"),
@@ -284,6 +270,12 @@ def test_auto_is_the_processor_for_quantile_without_cupy(monkeypatch, architectu
     monkeypatch.setattr(device, "has_cupy", lambda: False)
     assert Generator.open(10, architecture).device == taken
     assert Generator.open(10, architecture, device="cuda").device == "cuda"
+
+
+@pytest.mark.usefixtures("gpu")
+def test_a_gpu_has_two_threads_unless_told_otherwise(model_file):
+    assert Generator.open(file=model_file, device="cuda").threads == 2
+    assert Generator.open(file=model_file, device="cuda", threads=3).threads == 3
 
 
 def test_muons_of_a_processor_can_not_stay_on_a_gpu(model_file):
