@@ -89,7 +89,7 @@ PLAN: dict[str, Surface | Slab] = {
         *_chain("testing", "testing-surface-20m", (20, 25, 30, 35), 812_000),
         Surface("testing-surface-40m", 83_000_000, 40_000_000, 40),
         *_chain("testing", "testing-surface-40m", (40, 50, 60, 70, 85, 100), 813_000),
-        Surface("testing-0m", 81_000_000, 4_100_000),
+        Surface("testing-0m", 81_000_000, 4_000_000),
         *_chain("testing", "testing-0m", (0.1, 0.2, 0.3, 0.5, 1, 3, 4.5, 6, 8, 10), 811_000),
     )
 }
