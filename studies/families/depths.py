@@ -166,7 +166,7 @@ def draw(scored: list[Scored], curve: dict[str, Any], density: float, wanted: tu
         for limit, colour in zip(wanted, COLOURS, strict=False):
             delta.axhline(limit, color=colour, ls=":")
         delta.set(ylabel="δ / %", ylim=(0, None))
-        delta.legend(frameon=False, ncols=2)
+        delta.legend(frameon=False, ncols=2, loc="upper left")
         places = density * np.array(curve["depth_m"]) + OFFSET
         rate.plot(places, np.exp(curve["ln_rate"]), color=COLOURS[0], label="rate / (1/m² s)")
         rate.plot(places, curve["mean_energy"], color=COLOURS[1], label="mean energy / GeV")
