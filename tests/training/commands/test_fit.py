@@ -349,7 +349,7 @@ def test_an_uncertainty_that_nobody_stated_is_unknown_and_targets_say_what_can_b
     words = [COMMAND, "evaluate", model, "unsure.h5", "-o", "x.html", "-n", "1e5", "--variance-factor", "1.2"]
     out = subprocess.run(words, capture_output=True, text=True, check=True).stdout
     assert re.search(r"\| rate \(Hz/m2\), statistical errors \| 129 \| 129 ± 0.25 and unknown \|  \|", out)
-    assert re.search(r"\| tail above 1 TeV .*\| excess ≤ 0.05 \| ± [\d.]+ \| too few muons to tell \|", out)
+    assert re.search(r"\| tail above 1 TeV .*\| excess ≤ 0.03 \| ± [\d.]+ \| too few muons to tell \|", out)
     for edges in "0 to 0.05", "0.05 to 0.1", "0.1 to 0.15", "0.15 to 0.2":
         assert f"| cos zenith {edges} |" in out
     page = Path("x.html").read_text()
