@@ -279,13 +279,15 @@ def gen(
     cuts = Cuts(energy_min, energy_max, zenith_min, zenith_max)
     target = next((target_of(name, numbers) for name, numbers in given.items()), None)
     output_format(output, form).check_output(output, overwrite, [] if model is None else [model])
+    # Then a GPU would not have begun before the processor is done.
+    is_quick = model is None and architecture in (None, "quantile") and number is not None and number <= WORTH_A_GPU
     generator = Generator.open(
         depth,
         architecture,
         flux=flux,
         medium=medium,
         file=model,
-        device=_faster_device(device, architecture if model is None else str(model), number),
+        device="cpu" if device == "auto" and is_quick else device,
         threads=threads,
     )
     seed = new_seed() if seed is None else seed
@@ -323,12 +325,6 @@ def gen(
 def main() -> NoReturn:
     """Run `deepmuon-gen`."""
     run(gen, NAME)
-
-
-def _faster_device(device: str, architecture: str | None, number: int | None) -> str:
-    """Return "cpu" where "auto" was asked for and a GPU would not have begun before the processor is done."""
-    is_quick = architecture in (None, "quantile") and number is not None and number <= WORTH_A_GPU
-    return "cpu" if device == "auto" and is_quick else device
 
 
 def _check_model_options(depth: float | None, model: Path | None, released: Mapping[str, str | None]) -> None:

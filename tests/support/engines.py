@@ -144,14 +144,13 @@ def run_in_node(package: str, models: tuple[Path, ...]) -> dict[str, Muons]:
     return {model: as_muons(columns) for model, columns in json.loads(node.stdout).items()}
 
 
-def run_in_onnxruntime(model: Path, provider: Any = "CPUExecutionProvider") -> Muons:
+def run_in_onnxruntime(model: Path, provider: str = "CPUExecutionProvider", **options: str) -> Muons:
     import onnxruntime
 
-    if provider != "CPUExecutionProvider":
+    if provider == "CUDAExecutionProvider":
         onnxruntime.preload_dlls(directory="")  # CUDA's, as pip installs them
-    session = onnxruntime.InferenceSession(model, providers=[provider])
-    asked = provider if isinstance(provider, str) else provider[0]
-    assert session.get_providers()[0] == asked, "ONNX Runtime took another device"
+    session = onnxruntime.InferenceSession(model, providers=[(provider, options)])
+    assert session.get_providers()[0] == provider, "ONNX Runtime took another device"
     return Muons(*session.run(OUTPUTS, {"latent": latents_of(model)}))
 
 
@@ -210,7 +209,7 @@ ENGINES = {
         "onnxruntime-gpu",
         partial(version, "onnxruntime-gpu"),
         no_cuda,
-        partial(run_in_onnxruntime, provider=("CUDAExecutionProvider", {"use_tf32": "0"})),
+        partial(run_in_onnxruntime, provider="CUDAExecutionProvider", use_tf32="0"),
     ),
     "ONNX Runtime in Node.js": javascript("onnxruntime-node"),
     "ONNX Runtime in WebAssembly": javascript("onnxruntime-web"),

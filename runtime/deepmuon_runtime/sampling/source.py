@@ -29,7 +29,7 @@ __all__ = ["TRIED", "Source", "block_draws"]
 # Muons of one run of the network, about. What a wide network works on shall stay in a CPU's cache. Tables need little;
 # what they cost is that threads take turns at Python's lock, block by block. A GPU wants much at once.
 BLOCK = {"cpu": 1 << 14, "cuda": 1 << 18}
-BLOCK_OF_SINGLE_MUONS = {"cpu": 1 << 16, "cuda": 1 << 18}
+BLOCK_OF_SINGLE_MUONS = {**BLOCK, "cpu": 1 << 16}
 TRIED = 5
 """Values of the latents that are tried before the first muons: the ends, the middle, and two between."""
 

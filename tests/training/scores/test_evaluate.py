@@ -202,10 +202,7 @@ def test_an_architecture_without_targets_gets_a_neutral_verdict(clean, faulty):
     [
         (Score.of("tail above 1 TeV", 5.7, 1.0, 1.7), "too few muons to tell"),  # 4.7 beyond the limit, within noise
         (Score.of("tail above 1 TeV", 1.0, 1.0, 0.2), "too few muons to tell"),
-        (
-            Score.of("tail above 1 TeV", 0.92, 1.0, 0.02),
-            "too few muons to tell",
-        ),  # 4 sigma, beyond the limit by 2.5
+        (Score.of("tail above 1 TeV", 0.92, 1.0, 0.02), "too few muons to tell"),  # 4 sigma, and 2.5 beyond the limit
         (Score.of("tail above 1 TeV", 0.9, 1.0, 0.01), "missed"),
         (Score.of("tail above 1 TeV", 0.975, 1.0, 0.006), "met"),  # 4 sigma, but within the limit
         (Score.of("tail above 1 TeV", 1.06, 1.0, 0.03), "met"),  # beyond the limit by noise
