@@ -58,6 +58,7 @@ def killed_while_writing(folder: Path, before: str = "") -> tuple[subprocess.Pop
     told = folder / "child"
     wait_until(lambda: told.exists() and told.read_text())
     process.kill()
+    process.wait()  # a killed process goes on for a moment, and its child has a parent until it has ended
     return process, int(told.read_text())
 
 
