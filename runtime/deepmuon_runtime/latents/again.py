@@ -7,6 +7,8 @@ draws that are made again are made by themselves.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.random import Philox
 from numpy.typing import NDArray
@@ -19,11 +21,12 @@ __all__ = ["numbers_again"]
 _MULTIPLIERS = np.array([[0xD2E7470EE14C6C93], [0xCA5A826395121157]], np.uint64)
 _STEPS = np.array([[0x9E3779B97F4A7C15], [0xBB67AE8584CAA73B]], np.uint64)
 _ROUNDS = 10
-_LOW, _HALF = np.uint64(0xFFFFFFFF), np.uint64(32)
+_LOW, _HALF = np.array(0xFFFFFFFF, np.uint64), np.array(32, np.uint64)  # arrays: numpy makes one of a number each time
 _LOW_OF_MULTIPLIERS, _HIGH_OF_MULTIPLIERS = _MULTIPLIERS & _LOW, _MULTIPLIERS >> _HALF
 
-_AT_ONCE = 1 << 12  # counters that are computed side by side: they stay in the cache
-_DENSE = 14  # a counter here takes as long as so many of numpy's in a row: 5 (Xeon) to 30 (EPYC)
+_AT_ONCE = 1 << 13  # counters that are computed side by side: they stay in the cache
+_DENSE = 6  # a counter here takes as long as so many of numpy's in a row, about
+_ROW = 1 << 13  # counters that are taken in a row, of which some draws' are kept
 _LARGE = 8  # counters of a draw, from which on each draw is made by itself
 
 
@@ -54,16 +57,15 @@ def numbers_again(
     key = seed + (stream << 64)
     if counters >= _LARGE:
         rows = [
-            _row(key, attempt, draw * counters, counters)
+            _philox_at(key, attempt, draw * counters).random_raw(4 * counters)
             for attempt, draw in zip(attempts.tolist(), draws.tolist(), strict=True)
         ]
         words = np.concatenate(rows)
     else:
-        first, span = int(draws[0]), int(draws[-1] - draws[0]) + 1
+        span = int(draws[-1] - draws[0]) + 1
         is_dense = span < _DENSE * len(draws) and bool((attempts == attempts[0]).all())
         if is_dense:
-            words = _row(key, int(attempts[0]), first * counters, span * counters)
-            words = words.reshape(span, 4 * counters)[draws - first]
+            words = _among_all(key, int(attempts[0]), draws, counters)
         else:
             each = (draws[:, None] * counters + np.arange(1, counters + 1)).ravel().astype(np.uint64)
             words = _philox(seed, stream, np.repeat(attempts, counters).astype(np.uint64), each)
@@ -75,9 +77,22 @@ def numbers_again(
     return found
 
 
-def _row(key: int, attempt: int, first: int, counters: int) -> NDArray[np.uint64]:
-    """Return the words at consecutive counters."""
-    return Philox(key=key, counter=first + (attempt << 128) + (FOR_ATTEMPTS << 192)).random_raw(4 * counters)
+def _philox_at(key: int, attempt: int, counter: int) -> Philox:
+    """Return a generator whose first words are those after a counter."""
+    return Philox(key=key, counter=counter + (attempt << 128) + (FOR_ATTEMPTS << 192))
+
+
+def _among_all(key: int, attempt: int, draws: NDArray[np.int64], counters: int) -> NDArray[np.uint64]:
+    """Return the words of draws, in order, from those of all draws between the first and the last: [n, 4 counters]."""
+    first, step = int(draws[0]), _ROW // counters
+    philox = _philox_at(key, attempt, first * counters)
+    words = np.empty((len(draws), 4 * counters), np.uint64)
+    starts = range(first, int(draws[-1]) + 1, step)
+    bounds = [*np.searchsorted(draws, starts).tolist(), len(draws)]
+    for start, (begin, end) in zip(starts, pairwise(bounds), strict=True):
+        row = philox.random_raw(4 * counters * step).reshape(step, -1)
+        row.take(draws[begin:end] - start, axis=0, out=words[begin:end], mode="clip")  # which needs no copy
+    return words
 
 
 def _philox(seed: int, stream: int, attempts: NDArray[np.uint64], counters: NDArray[np.uint64]) -> NDArray[np.uint64]:
@@ -99,23 +114,23 @@ def _side_by_side(
     low, middle, high, part = (np.empty_like(even) for _ in range(4))
     for _ in range(_ROUNDS):
         # The product of 64 x 64 bits, from four of 32 x 32.
-        np.bitwise_and(even, _LOW, out=low)
-        np.right_shift(even, _HALF, out=high)
-        np.multiply(low, _LOW_OF_MULTIPLIERS, out=part)
-        part >>= _HALF
-        np.multiply(high, _LOW_OF_MULTIPLIERS, out=middle)
-        middle += part
-        np.bitwise_and(middle, _LOW, out=part)
-        middle >>= _HALF
-        low *= _HIGH_OF_MULTIPLIERS
-        part += low
-        part >>= _HALF
-        high *= _HIGH_OF_MULTIPLIERS
-        high += middle
-        high += part
-        even *= _MULTIPLIERS
-        odd ^= key
-        odd ^= high[::-1]
-        even, odd = odd, even[::-1].copy()
+        np.bitwise_and(even, _LOW, low)
+        np.right_shift(even, _HALF, high)
+        np.multiply(low, _LOW_OF_MULTIPLIERS, part)
+        np.right_shift(part, _HALF, part)
+        np.multiply(high, _LOW_OF_MULTIPLIERS, middle)
+        np.add(middle, part, middle)
+        np.bitwise_and(middle, _LOW, part)
+        np.right_shift(middle, _HALF, middle)
+        np.multiply(low, _HIGH_OF_MULTIPLIERS, low)
+        np.add(part, low, part)
+        np.right_shift(part, _HALF, part)
+        np.multiply(high, _HIGH_OF_MULTIPLIERS, high)
+        np.add(high, middle, high)
+        np.add(high, part, high)
+        np.multiply(even, _MULTIPLIERS, even)
+        np.bitwise_xor(odd, key, odd)
+        np.bitwise_xor(odd, high[::-1], odd)
+        even, odd = odd, even[::-1]
         key = key + _STEPS  # modulo 2^64
     return np.stack([even[0], odd[0], even[1], odd[1]], axis=1)

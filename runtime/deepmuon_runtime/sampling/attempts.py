@@ -75,18 +75,33 @@ class Attempts:
         """Make all muons of a unit."""
         have = self._arrays.zeros(self._draws, np.int64)  # muons that each draw has
         first = number * self._draws
+        wanting = []
         for start in range(0, self._draws, self._block):
             stopped()
             places = self._arrays.arange(start, min(start + self._block, self._draws), dtype=np.int64)
             draws = range(first + start, first + start + len(places))
             if self._per_draw == 1:  # made where they shall be: what is rejected gives way to a later attempt
                 part = slice(start, start + len(places))
-                have[part] = self._drawing.first(made[part], seed, draws)
+                taken = self._drawing.first(made[part], seed, draws)
+                have[part] = taken
+                wanting.append(places[~taken])
             else:
                 tried = self._drawing.empty(len(draws) * self._per_draw)
                 self._keep(made, have, places, tried, self._drawing.first(tried, seed, draws))
+                wanting.append(places[have[places] < self._per_draw])
+        self._try_again(made, have, np.concatenate(wanting), seed, first, stopped)
+
+    def _try_again(
+        self,
+        made: Muons,
+        have: NDArray[np.int64],
+        wanting: NDArray[np.int64],
+        seed: int,
+        first: int,
+        stopped: Callable[[], object],
+    ) -> None:
+        """Make later attempts of the draws that want muons, until none does."""
         attempt, together = 1, 1
-        wanting = np.flatnonzero(have < self._per_draw)
         while len(wanting):
             for start in range(0, len(wanting), self._block // together):
                 stopped()
@@ -118,10 +133,15 @@ class Attempts:
         tried, taken
             What was made of them, one or more attempts of each in a row, and which of these are taken.
         """
-        of_each = taken.reshape(len(places), -1)
-        rank = np.cumsum(of_each, axis=1) + have[places][:, None]  # from 1
-        fits = np.flatnonzero(of_each & (rank <= self._per_draw))
-        wanted = (places[:, None] * self._per_draw + rank - 1).ravel()[fits]
+        if self._per_draw == len(taken) // len(places) == 1:  # as below, at a third of the time
+            fits = np.flatnonzero(taken)
+            wanted = places[fits]
+            have[wanted] = 1
+        else:
+            of_each = taken.reshape(len(places), -1)
+            rank = np.cumsum(of_each, axis=1) + have[places][:, None]  # from 1
+            fits = np.flatnonzero(of_each & (rank <= self._per_draw))
+            wanted = (places[:, None] * self._per_draw + rank - 1).ravel()[fits]
+            have[places] = np.minimum(rank[:, -1], self._per_draw)
         for name, column in tried.columns.items():
             made.columns[name][wanted] = column[fits]
-        have[places] = np.minimum(rank[:, -1], self._per_draw)

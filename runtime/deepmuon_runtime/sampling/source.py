@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from deepmuon_runtime.errors import FailedError, RefusedError, first_line
+from deepmuon_runtime.freed_memory import keep_freed_memory
 from deepmuon_runtime.latents.again import numbers_again
 from deepmuon_runtime.latents.philox import FOR_LATENTS, fill_latents
 from deepmuon_runtime.model.metadata import LATENTS_PER_MUON, Model
@@ -56,6 +57,7 @@ class Source:
         self.block_draws = block_draws(model, (BLOCK_OF_SINGLE_MUONS if model.muons_per_draw == 1 else BLOCK)[device])
         self._session = session
         self._own = threading.local()  # each thread's memory for its runs
+        keep_freed_memory()
 
     @cached_property
     def on_device(self) -> DeviceMaker | None:

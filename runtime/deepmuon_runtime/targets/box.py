@@ -67,10 +67,10 @@ class Box(Target):
 
     def enters(self, u: Array, v: Array, w: Array, numbers: Array) -> Entries:
         """Choose one of the faces that are seen, or none, by their shadows, and a place on it."""
-        first, second = numbers[:, 1], numbers[:, 2]
-        x, y, z = (np.float32(width / 2) for width in self.size)
+        # Products with 0 and 1 are several times as fast as choices, and exact too.
+        one = np.float32(1)
         share_x, share_y, share_z = (np.float32(2 * face / self.largest_area) for face in self._faces)
-        left = numbers[:, 0] + np.float32(1)  # from 0 to 2, the whole of the largest area
+        left = numbers[:, 0] + one  # from 0 to 2, the whole of the largest area
         left += share_z * w
         is_top = left < 0
         left -= share_x * np.abs(u)
@@ -78,15 +78,20 @@ class Box(Target):
         left -= share_y * np.abs(v)
         hits = left < 0
         on_y = ~(on_x | is_top)  # or on none
-        # Products with 0 and 1 are several times as fast as choices, and exact too.
+        first, second = (np.ascontiguousarray(numbers[:, number], like=numbers) for number in (1, 2))
         at_x, at_y, at_top = (chosen.astype(np.float32) for chosen in (on_x, on_y, is_top))
-        other = np.float32(1) - at_x
-        return Entries(
-            hits,
-            x * first * other + np.copysign(x, -u) * at_x,
-            y * second * (np.float32(1) - at_y) + np.copysign(y, -v) * at_y,
-            z * ((first * at_x + second * other) * (np.float32(1) - at_top) + at_top),
-        )
+        half_x, half_y, half_z = (np.float32(width / 2) for width in self.size)
+        across = one - at_x
+        z = second * across
+        z += first * at_x
+        z *= one - at_top
+        z += at_top
+        z *= half_z
+        across *= first
+        x = _on_face(across, half_x, at_x, u)
+        across = one - at_y
+        across *= second
+        return Entries(hits, x, _on_face(across, half_y, at_y, v), z)
 
     def touches(self, x: Array, y: Array, z: Array, u: Array, v: Array, w: Array) -> NDArray[np.bool_]:
         """Tell whether places are on one of the faces that muons come in by."""
@@ -96,3 +101,14 @@ class Box(Target):
             is_inside &= np.abs(place) <= half + near
             is_on_face |= (np.abs(place + np.copysign(half, along)) <= near) & (along != 0)
         return is_inside & is_on_face
+
+
+def _on_face(across: Array, half: np.float32, is_there: Array, along: Array) -> Array:
+    """Return half a width times where muons cross it, or, where they come in by its face, the end they come from."""
+    across *= half
+    end = (along < 0).astype(np.float32)
+    end *= 2 * half
+    end -= half
+    end *= is_there
+    across += end
+    return across
