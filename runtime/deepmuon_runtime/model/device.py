@@ -6,7 +6,6 @@ import io
 import os
 import warnings
 from contextlib import redirect_stdout
-from importlib.metadata import PackageNotFoundError, distribution
 from importlib.util import find_spec
 
 import onnxruntime
@@ -141,6 +140,8 @@ def _warn_of_two_runtimes() -> None:
 
 
 def _is_installed(name: str) -> bool:
+    from importlib.metadata import PackageNotFoundError, distribution
+
     try:
         distribution(name)
     except PackageNotFoundError:

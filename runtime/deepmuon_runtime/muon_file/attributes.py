@@ -7,7 +7,6 @@ import os
 import re
 from collections.abc import Callable, Iterator, Mapping
 from datetime import datetime, timedelta, timezone
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +17,7 @@ from deepmuon_runtime.model.metadata import Model, are_one_rate, is_name
 from deepmuon_runtime.muon_file.checksum import attributes_crc32, unlike
 from deepmuon_runtime.muon_file.format import ATTRIBUTES_CHECKSUM, python_value
 from deepmuon_runtime.muon_file.place_and_time import choice_defects
+from deepmuon_runtime.version import VERSION
 
 __all__ = [
     "ALWAYS",
@@ -284,7 +284,7 @@ class Description:
 
     def of(self, count: int) -> dict[str, Any]:
         """Return all attributes of a file of so many muons that is complete now."""
-        attributes = {"created_by": f"deepmuon-runtime {version('deepmuon-runtime')}", **self._attributes}
+        attributes = {"created_by": f"deepmuon-runtime {VERSION}", **self._attributes}
         attributes["count"] = count
         attributes["created"] = (self._created or datetime.now(timezone.utc)).isoformat(timespec="seconds")
         for live_time, rate in LIVE_TIMES.items():
