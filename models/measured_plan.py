@@ -18,7 +18,7 @@ EQUIVALENTS = {"water": _KNOTS, "rock": (*_KNOTS, 6625)}
 """Knots of each [m w.e.]: 5,000 m of water, 2,500 m of rock."""
 
 MUONS = 4_000_000
-TESTING = 1_000_000
+TESTING, TESTING_BETWEEN = 1_000_000, 500_000  # at knots, and halfway between two
 
 
 @dataclass(frozen=True)
@@ -44,12 +44,13 @@ def depths(medium: str, *, between: bool) -> tuple[float, ...]:
 
 
 def _plan(medium: str, seed: int) -> list[Deep]:
-    parts = (("training", depths(medium, between=False), MUONS), ("testing", depths(medium, between=True), TESTING))
-    return [
-        Deep(sample_name(part, depth), medium, depth, muons, seed + 1000 * number + place)
-        for number, (part, of_part, muons) in enumerate(parts)
-        for place, depth in enumerate(of_part)
+    knots = depths(medium, between=False)
+    training = [Deep(sample_name("training", depth), medium, depth, MUONS, seed + n) for n, depth in enumerate(knots)]
+    testing = [
+        Deep(sample_name("testing", depth), medium, depth, TESTING if depth in knots else TESTING_BETWEEN, seed + n)
+        for n, depth in enumerate(depths(medium, between=True), start=1000)
     ]
+    return [*training, *testing]
 
 
 PLAN: dict[str, tuple[Deep, ...]] = {"water": tuple(_plan("water", 910_000)), "rock": tuple(_plan("rock", 920_000))}
