@@ -32,7 +32,7 @@ SURFACES = {"plane": 0, "sphere": 1}
     "--flux",
     metavar="NAME",
     shell_complete=fluxes,
-    help="Of the released family, at sea level: cry, if left out.",
+    help="Of the released family, at sea level: cry (the default) or measured.",
 )
 @click.option(
     "--medium",
@@ -63,8 +63,8 @@ def bake(
     """Take the model of one depth out of a family: a smaller file, for a program of your own.
 
     \b
-        deepmuon-bake family.onnx --depth 13.7 -o own-13.7m.onnx
-        deepmuon-bake --depth 13.7 -o water-13.7m.onnx
+        deepmuon-bake family.onnx --depth 13.7 -o water-13.7m.onnx
+        deepmuon-bake --flux measured --depth 3500 -o sea-3500m.onnx
 
     FAMILY is an ONNX file; if left out, the released one of the flux and the medium. The muons of the new file are
     those that `deepmuon-gen` makes of the family at this depth and of the same seed. The file says in `baked_from`

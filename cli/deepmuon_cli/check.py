@@ -18,10 +18,10 @@ __all__ = ["check", "main"]
 
 NAME = "deepmuon-check"
 RATES = (
-    ("rate_hz_per_m2", "rate_uncertainty_hz_per_m2", ".2f", "m2 and s"),
-    ("target_rate_hz", "target_rate_uncertainty_hz", ".5g", "s"),
+    ("rate_hz_per_m2", "rate_uncertainty_hz_per_m2", "m2 and s"),
+    ("target_rate_hz", "target_rate_uncertainty_hz", "s"),
 )
-"""Attributes with a rate and its uncertainty, and how they are shown."""
+"""Attributes with a rate and its uncertainty, and per what it is."""
 
 
 @click.command(name=NAME, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -79,10 +79,10 @@ def _summary(report: Report) -> Iterator[tuple[str, str]]:
         yield "mean cos zenith", f"{report.mean_cos_zenith:.4f}"
     if report.mu_minus:
         yield "mu+ / mu-", f"{report.mu_plus / report.mu_minus:.4f}"
-    for rate, uncertainty, form, of in RATES:
+    for rate, uncertainty, of in RATES:
         if rate in known:
             error = f" +- {known[uncertainty]:.2g}" if uncertainty in known else ""
-            yield "rate", f"{known[rate]:{form}}{error} per {of}"
+            yield "rate", f"{known[rate]:.5g}{error} per {of}"
     if "live_time_s_m2" in known:
         yield "live time", f"{known['live_time_s_m2']:,.1f} s for 1 m2"
     if "target_live_time_s" in known:

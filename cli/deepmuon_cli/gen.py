@@ -118,7 +118,7 @@ RECORDED = (
     "--flux",
     metavar="NAME",
     shell_complete=fluxes,
-    help="At sea level: cry, if left out (see --list).",
+    help="At sea level: cry (the default), or measured, fitted to measurements.",
 )
 @click.option(
     "--medium",
@@ -229,6 +229,11 @@ def gen(
 
     \b
         deepmuon-gen --depth 10 --box 4 4 3 --live-time 60 -o tank.h5
+
+    Those of the measured flux that cross 100 m2 at the bottom of the sea in a day:
+
+    \b
+        deepmuon-gen --flux measured --depth 3500 --live-time 86400 --area 100 -o day.h5
 
     Those of 10 GeV and more that come from 60 to 90 degrees:
 

@@ -97,7 +97,7 @@ class Generator:
         architecture
             "quantile" or "transformer"; the default one if left out.
         flux
-            At sea level; "cry" if left out.
+            At sea level: "cry", or "measured", which is fitted to measurements; "cry" if left out.
         medium
             Above the muons; "water" if left out.
         file

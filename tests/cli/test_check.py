@@ -71,13 +71,22 @@ def test_a_good_file_is_summed_up(check, good_file):
         f"  mean kinetic energy {energy.mean():.4g} GeV",
         f"  mean cos zenith     {-w.mean():.4f}",
         f"  mu+ / mu-           {(pdg_id == -13).sum() / (pdg_id == 13).sum():.4f}",
-        "  rate                55.50 +- 0.1 per m2 and s",
+        "  rate                55.5 +- 0.1 per m2 and s",
         "  live time           18.0 s for 1 m2",
         "  seed                7",
         "  shard               1/1, from muon 0 of 1,000",
         f"  model               the released quantile-10m.onnx, SHA-256 {sha256}",
         "no defects found",
     ]
+
+
+def test_a_rate_deep_below_is_not_rounded_to_nothing(check, tmp_path):
+    model = tmp_path / "deep.onnx"
+    model.write_bytes(tiny_model(metadata={"rate_hz_per_m2": "1.4253e-4", "rate_uncertainty_hz_per_m2": "1.5e-7"}))
+    Generator.open(file=model).write(tmp_path / "muons.h5", 10)
+    code, lines, _ = check(tmp_path / "muons.h5")
+    assert code == 0
+    assert "  rate                0.00014253 +- 1.5e-07 per m2 and s" in lines
 
 
 def test_target_cuts_rate_and_times_are_summed_up(check, tmp_path, model_file):
@@ -128,7 +137,7 @@ def test_muons_of_a_family_are_those_of_a_released_model_whatever_their_depth(ch
     assert code == 0
     assert "  depth               13.7 m of water" in lines
     assert "  flux at sea level   test" in lines
-    assert "  rate                82.60 +- 0.17 per m2 and s" in lines
+    assert "  rate                82.6 +- 0.17 per m2 and s" in lines
     assert any(line.startswith("  model               the released quantile-water.onnx, SHA-256 ") for line in lines)
 
 

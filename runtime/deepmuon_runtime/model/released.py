@@ -97,7 +97,7 @@ def released_model(
     architecture
         "quantile" or "transformer"; the default one if left out.
     flux
-        At sea level; "cry" if left out.
+        At sea level, "cry" or "measured"; "cry" if left out.
     medium
         Above the muons; "water" if left out.
 
