@@ -75,33 +75,18 @@ class Attempts:
         """Make all muons of a unit."""
         have = self._arrays.zeros(self._draws, np.int64)  # muons that each draw has
         first = number * self._draws
-        wanting = []
         for start in range(0, self._draws, self._block):
             stopped()
             places = self._arrays.arange(start, min(start + self._block, self._draws), dtype=np.int64)
             draws = range(first + start, first + start + len(places))
             if self._per_draw == 1:  # made where they shall be: what is rejected gives way to a later attempt
                 part = slice(start, start + len(places))
-                taken = self._drawing.first(made[part], seed, draws)
-                have[part] = taken
-                wanting.append(places[~taken])
+                have[part] = self._drawing.first(made[part], seed, draws)
             else:
                 tried = self._drawing.empty(len(draws) * self._per_draw)
                 self._keep(made, have, places, tried, self._drawing.first(tried, seed, draws))
-                wanting.append(places[have[places] < self._per_draw])
-        self._try_again(made, have, np.concatenate(wanting), seed, first, stopped)
-
-    def _try_again(
-        self,
-        made: Muons,
-        have: NDArray[np.int64],
-        wanting: NDArray[np.int64],
-        seed: int,
-        first: int,
-        stopped: Callable[[], object],
-    ) -> None:
-        """Make later attempts of the draws that want muons, until none does."""
         attempt, together = 1, 1
+        wanting = np.flatnonzero(have < self._per_draw)
         while len(wanting):
             for start in range(0, len(wanting), self._block // together):
                 stopped()
