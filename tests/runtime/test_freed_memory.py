@@ -8,6 +8,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other C libraries have their own ways")
+
 # Twenty times 40 arrays of 64 pages each; at the end, how many pages the system gave.
 PROGRAM = """
 import resource
@@ -32,13 +34,11 @@ def pages_given(first: str) -> int:
     return int(done.stdout)
 
 
-@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other C libraries have their own ways")
 def test_memory_that_was_freed_is_not_asked_of_the_system_again():
     assert pages_given("keep_freed_memory()") < 1000
     assert pages_given("") > 10_000
 
 
 def test_where_addresses_are_limited_nothing_is_kept():
-    pytest.importorskip("resource")
     limited = "resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30)); keep_freed_memory()"
     assert pages_given(limited) > 1000

@@ -118,15 +118,11 @@ class Attempts:
         tried, taken
             What was made of them, one or more attempts of each in a row, and which of these are taken.
         """
-        if self._per_draw == len(taken) // len(places) == 1:  # as below, at a third of the time
-            fits = np.flatnonzero(taken)
-            wanted = places[fits]
-            have[wanted] = 1
-        else:
-            of_each = taken.reshape(len(places), -1)
-            rank = np.cumsum(of_each, axis=1) + have[places][:, None]  # from 1
-            fits = np.flatnonzero(of_each & (rank <= self._per_draw))
-            wanted = (places[:, None] * self._per_draw + rank - 1).ravel()[fits]
-            have[places] = np.minimum(rank[:, -1], self._per_draw)
+        of_each = taken.reshape(len(places), -1)
+        total = np.cumsum(taken).reshape(of_each.shape)  # in one go: sums of each row take long where rows are short
+        rank = total + (have[places] - total[:, 0] + of_each[:, 0])[:, None]  # from 1
+        fits = np.flatnonzero(of_each & (rank <= self._per_draw))
+        wanted = (places[:, None] * self._per_draw + rank - 1).ravel()[fits]
+        have[places] = np.minimum(rank[:, -1], self._per_draw)
         for name, column in tried.columns.items():
             made.columns[name][wanted] = column[fits]
