@@ -28,6 +28,8 @@ __all__ = ["Rate", "Selection"]
 PIECE = {"cpu": 1 << 17, "cuda": 1 << 18}
 """Muons of one task of a thread, and of one write, in whole blocks."""
 
+OF_REJECTED = 2  # times as many where some are made again: the last rounds of it cost a task of any size as much
+
 
 def _never() -> None:
     """Go on."""
@@ -186,7 +188,7 @@ class Selection:
         if self.on_device is not None:
             return self.on_device.block_muons
         block = self.source.block_muons
-        return -(-PIECE[self.source.device] // block) * block
+        return -(-PIECE[self.source.device] * (OF_REJECTED if self.rejects else 1) // block) * block
 
     @property
     def _maker(self) -> Maker:
