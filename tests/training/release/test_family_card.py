@@ -41,7 +41,7 @@ def text(file, knots, sample) -> str:
 
 def test_a_familys_card_says_its_range_knots_and_muons(text, knots, file):
     assert text.startswith("# quantile, 0 to 2 m of water\n")
-    assert "(G4_WATER in Geant4)" in text
+    assert "(G4_WATER in its samples)" in text
     for knot in knots:
         assert f"| {knot.depth_m:g} | 100,000 | 129.035 ± 0.25 |" in text
     for key, value in manifest_entry(file).items():

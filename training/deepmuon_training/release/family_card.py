@@ -54,7 +54,7 @@ def family_card(
         [
             f"# {said['architecture']}, {range_} of {said['medium']}{of_flux}",
             "",
-            f"Muons under any depth of {range_} of {said['medium']} ({knots[-1].medium} in Geant4), by the "
+            f"Muons under any depth of {range_} of {said['medium']} ({knots[-1].medium} in its samples), by the "
             f"`{said['architecture']}` architecture: a family.",
             "",
             "| | |",
