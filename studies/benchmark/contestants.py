@@ -67,6 +67,8 @@ def contestants(folder: Path, cry: Path | None, ecomug: Path | None, old: Path |
         if binary:
             yield Contestant(name, per_core([str(binary)]), 0.04)
     yield Contestant(DEFAULT, deepmuon_gen("--depth", "0"))
+    for which in (("--box", "4", "4", "3"), ("--energy-min", "1")):
+        yield Contestant(f"{DEFAULT} {' '.join(which)}", deepmuon_gen("--depth", "0", *which), 0.3)
     yield Contestant(SAMPLE, own_python([sys.executable], SAMPLE_CODE), 0.1, writes=False)
     if old:
         apart = ["env", "-u", "PYTHONPATH"]  # which may lead to this tree

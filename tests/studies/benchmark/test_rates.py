@@ -50,6 +50,7 @@ def test_all_contestants_run_and_are_in_the_table_and_beside_it(driver: Path, tm
     report = json.loads(output.with_suffix(".json").read_text())
     rows = {row["name"]: row for row in report["rows"]}
     assert {"deepmuon-gen", "library, no file", "CRY", "limit: writing alone"} < set(rows)
+    assert {"deepmuon-gen --box 4 4 3", "deepmuon-gen --energy-min 1"} < set(rows)
     assert "EcoMug" not in rows
     assert (rows["CRY"]["muons"], rows["CRY"]["bytes_per_muon"]) == (40, 20)
     assert {"sample() to memory", "0.1.0", "sample() to memory, 0.1.0"} < set(rows)
