@@ -3,7 +3,8 @@
     python models/make_measured.py --work work
 
 What lies in the work folder is not made again, and an interrupted step goes on. On two cores about 4 hours of mulder
-for the samples (`--medium` makes one of the families), and then the fits and scores of 35 generators.
+for the samples (`--medium` makes one of the families), and then an hour and a half for the fits and scores of 35
+generators.
 """
 
 from __future__ import annotations

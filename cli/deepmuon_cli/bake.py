@@ -38,7 +38,7 @@ SURFACES = {"plane": 0, "sphere": 1}
     "--medium",
     metavar="NAME",
     shell_complete=media,
-    help="Of the released family: water, if left out.",
+    help="Of the released family: water (the default) or rock.",
 )
 @click.option(
     "--surface",
@@ -64,7 +64,7 @@ def bake(
 
     \b
         deepmuon-bake family.onnx --depth 13.7 -o water-13.7m.onnx
-        deepmuon-bake --flux measured --depth 3500 -o sea-3500m.onnx
+        deepmuon-bake --flux measured --medium rock --depth 1000 -o rock-1000m.onnx
 
     FAMILY is an ONNX file; if left out, the released one of the flux and the medium. The muons of the new file are
     those that `deepmuon-gen` makes of the family at this depth and of the same seed. The file says in `baked_from`

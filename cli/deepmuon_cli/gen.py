@@ -124,7 +124,7 @@ RECORDED = (
     "--medium",
     metavar="NAME",
     shell_complete=media,
-    help="Above the muons: water, if left out (see --list).",
+    help="Above the muons: water (the default) or rock, the standard one of 2.65 g/cm3.",
 )
 @click.option(
     "--architecture",
@@ -210,7 +210,7 @@ def gen(
 ) -> None:
     """Write cosmic-ray muons to a file: HDF5 (.h5), or .mcpl, .mcpl.gz, .root, .csv or .csv.gz by the end of its name.
 
-    The muons cross a horizontal plane downwards, at sea level (--depth 0) or under water, or enter a body:
+    The muons cross a horizontal plane downwards, at sea level (--depth 0), under water or rock, or enter a body:
     kinetic energy in GeV, direction of motion (u, v, w) with z up, and pdg_id, 13 for mu- and -13 for mu+. With a
     target they have places (x, y, z) in metres from its centre, with --live-time a time in seconds.
 
@@ -230,10 +230,10 @@ def gen(
     \b
         deepmuon-gen --depth 10 --box 4 4 3 --live-time 60 -o tank.h5
 
-    Those of the measured flux that cross 100 m2 at the bottom of the sea in a day:
+    Those of the measured flux that cross 100 m2 under a kilometre of rock in a day:
 
     \b
-        deepmuon-gen --flux measured --depth 3500 --live-time 86400 --area 100 -o day.h5
+        deepmuon-gen --flux measured --medium rock --depth 1000 --live-time 86400 --area 100 -o day.h5
 
     Those of 10 GeV and more that come from 60 to 90 degrees:
 

@@ -66,7 +66,7 @@ class Beam:
 @click.option("--box", nargs=3, type=float, default=(4.0, 4.0, 3.0), show_default=True, help="Its widths in metres.")
 @click.option("--depth", default=10.0, show_default=True, metavar="METRES", help="Above the box's centre.")
 @click.option("--flux", metavar="NAME", help="Of the released family: cry (if left out) or measured.")
-@click.option("--medium", metavar="NAME", help="Of the released family: water, if left out.")
+@click.option("--medium", metavar="NAME", help="Of the released family: water (if left out) or rock.")
 @click.option("--model", type=click.Path(), help="A family's file, instead of the released one.")
 @click.option("--zenith-min", type=float, metavar="DEGREES", help="Muons that come in flatter than this alone.")
 @click.option("--seed", default=1, show_default=True)

@@ -99,7 +99,7 @@ class Generator:
         flux
             At sea level: "cry", or "measured", which is fitted to measurements; "cry" if left out.
         medium
-            Above the muons; "water" if left out.
+            Above the muons: "water", or "rock", the standard one of 2.65 g/cm3; "water" if left out.
         file
             An ONNX file, instead of a released model.
         device

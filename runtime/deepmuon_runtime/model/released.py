@@ -99,7 +99,7 @@ def released_model(
     flux
         At sea level, "cry" or "measured"; "cry" if left out.
     medium
-        Above the muons; "water" if left out.
+        Above the muons, "water" or "rock"; "water" if left out.
 
     Raises
     ------
