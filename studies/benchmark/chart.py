@@ -7,12 +7,12 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from studies.benchmark.contestants import DEFAULT
+from studies.benchmark.contestants import DEFAULT, OLD, SAMPLE
 
 __all__ = ["draw"]
 
 OWN, LIMIT, OTHER = "#1f4e9e", "#bbbbbb", "#c1272d"
-OURS = (DEFAULT, "library", "transformer")
+OURS = (DEFAULT, SAMPLE, "library", "transformer")
 
 
 def draw(rows: list[dict[str, Any]], path: Path) -> None:
@@ -37,4 +37,4 @@ def colour(name: str) -> str:
     """Return the colour of a contestant's bar."""
     if name.startswith("limit"):
         return LIMIT
-    return OWN if name.startswith(OURS) else OTHER
+    return OWN if name.startswith(OURS) and not name.endswith(OLD) else OTHER
