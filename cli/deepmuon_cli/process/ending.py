@@ -80,8 +80,8 @@ def _printable(message: object) -> str:
 class _Leaving:
     """Ends the process once Python has done all it does before it takes itself apart.
 
-    What a C++ library destroys after that may still call Python, as ONNX Runtime's threads do rarely after a stop:
-    then the process would end by SIGSEGV. Registered before all others, this function of `atexit` is called last.
+    What a C++ library destroys after that may still call Python, as was seen, rarely, after a stop: then the process
+    would end by SIGSEGV. Registered before all others, this function of `atexit` is called last.
     """
 
     def __init__(self) -> None:
