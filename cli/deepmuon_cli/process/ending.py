@@ -16,8 +16,6 @@
 
 from __future__ import annotations
 
-import atexit
-import os
 import signal
 import sys
 import warnings
@@ -52,12 +50,10 @@ def run(command: click.Command, name: str) -> NoReturn:
     name
         What the user typed to start it.
     """
-    leaving = _Leaving()
     warnings.showwarning = lambda message, *_, **__: _say(f"{name}: warning:", message, "yellow")
     code, reason = _Stopping().outcome(lambda: _outcome(command, name))
     if reason:
         complain(name, reason)
-    leaving.code = code
     sys.exit(code)
 
 
@@ -75,26 +71,6 @@ def _say(beginning: str, message: object, colour: str) -> None:
 def _printable(message: object) -> str:
     """Return a text whose control characters, which a stranger's file may bring, are escaped."""
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in str(message))
-
-
-class _Leaving:
-    """Ends the process once Python has done all it does before it takes itself apart.
-
-    What a C++ library destroys after that may still call Python, as was seen, rarely, after a stop: then the process
-    would end by SIGSEGV. Registered before all others, this function of `atexit` is called last.
-    """
-
-    def __init__(self) -> None:
-        self.code: int | None = None  # an error that nobody expected: Python shows it, and ends as ever
-        atexit.register(self._leave)
-
-    def _leave(self) -> None:
-        if self.code is None:
-            return
-        for stream in (sys.stdout, sys.stderr):
-            with suppress(AttributeError, OSError, ValueError):  # closed, by who started the process or since
-                stream.flush()
-        os._exit(self.code)
 
 
 class _Stopped(BaseException):

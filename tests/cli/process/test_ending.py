@@ -77,31 +77,6 @@ def test_a_signal_that_gets_lost_again_and_again_arrives_at_last():
     assert run_command(textwrap.dedent(body)) == (143, "", "it: stopped by SIGTERM\n")
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="registers the destructor as glibc does")
-@pytest.mark.parametrize(("work", "code"), [("pass", 0), ("signal.raise_signal(signal.SIGTERM)", 143)])
-def test_a_librarys_destructor_that_calls_python_after_its_end_does_no_harm(work, code):
-    body = f"""
-        import ctypes
-        global destructor
-        destructor = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(lambda _: None)
-        ctypes.CDLL(None)["__cxa_atexit"](destructor, None, None)
-        {work}
-    """
-    assert run_command(textwrap.dedent(body))[0] == code
-
-
-def test_what_waits_for_the_end_is_done_before_the_process_ends():
-    body = """
-        import atexit, threading
-        def work():
-            time.sleep(0.3)
-            print("thread")
-        threading.Thread(target=work).start()
-        atexit.register(print, "atexit", end="")
-    """
-    assert run_command(textwrap.dedent(body)) == (0, "thread\natexit", "")
-
-
 def test_a_second_signal_does_not_disturb_the_cleaning_up():
     body = """
         try:
