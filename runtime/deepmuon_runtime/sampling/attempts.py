@@ -17,7 +17,6 @@ from deepmuon_runtime.sampling.drawing import Drawing
 __all__ = ["Attempts"]
 
 FEWEST = 16  # muons of a unit
-FASTER = 4  # times as many attempts of a draw from one round to the next: a round of few takes as long as of thousands
 OF_RARE = 8  # a unit of rare muons takes as long as so many pieces of common ones
 
 
@@ -98,7 +97,7 @@ class Attempts:
                 self._keep(made, have, places, tried, taken)
             wanting = wanting[have[wanting] < self._per_draw]
             attempt += together
-            together = min(FASTER * together, max(1, self._block // max(1, len(wanting))))
+            together = min(2 * together, max(1, self._block // max(1, len(wanting))))
 
     def _keep(
         self,

@@ -28,7 +28,7 @@ __all__ = ["Rate", "Selection"]
 PIECE = {"cpu": 1 << 17, "cuda": 1 << 18}
 """Muons of one task of a thread, and of one write, in whole blocks."""
 
-OF_REJECTED = 2  # times as many where some are made again: the last rounds of it cost a task of any size as much
+OF_REJECTED = 2  # times as many where some are made again: the last rounds cost a task of any size as much
 
 
 def _never() -> None:
